@@ -37,7 +37,7 @@ def holder_of(path: str) -> str:
     with suppress(OSError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
-        for line in LOCKS.read_text(encoding="ascii", errors="replace").splitlines():
+        for line in LOCKS.read_text(encoding="utf-8", errors="replace").splitlines():
             words = line.split()  # 1: FLOCK ADVISORY WRITE 4711 00:18:12 0 EOF
             if words[1:2] == ["FLOCK"] and words[5:6] == [device] and words[4] != str(os.getpid()):
                 return f"process {words[4]}{_command(words[4])}"

@@ -8,7 +8,7 @@ import os
 import socket
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 NAME = ".gritd.lock"
@@ -18,21 +18,46 @@ class LockError(Exception):
     """A folder or a socket is not ours: one line."""
 
 
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the folder, which is made where there is none. Raises LockError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = _held(folder / NAME)
-    except BlockingIOError:
-        raise LockError(f"{folder}: another gritd is logging here") from None
-    except OSError as error:
-        raise LockError(f"{folder}: cannot keep logs here: {_reason(error, NAME)}") from None
+class FolderLock:
+    """Holds a log folder, which is made where there is none. Raises LockError."""
 
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._lock = self._taken()
+
+    def _taken(self) -> int:
+        folder = self.folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return _held(folder / NAME)
+        except BlockingIOError:
+            raise LockError(f"{folder}: another gritd is logging here") from None
+        except OSError as error:
+            raise LockError(f"{folder}: cannot keep logs here: {_reason(error, NAME)}") from None
+
+    def renew(self) -> bool:
+        """Hold the folder that has the name now, where somebody removed the one that was held;
+        whether that was so. Raises LockError.
+        """
+        with suppress(OSError):
+            if os.path.samestat(os.fstat(self._lock), os.lstat(self.folder / NAME)):
+                return False
+        gone, self._lock = self._lock, self._taken()
+        os.close(gone)
+        return True
+
+    def close(self) -> None:
+        os.close(self._lock)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[FolderLock]:
+    """Hold a log folder. Raises LockError."""
+    lock = FolderLock(folder)
     try:
-        yield
+        yield lock
     finally:
-        os.close(lock)
+        lock.close()
 
 
 @contextmanager

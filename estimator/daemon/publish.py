@@ -71,10 +71,22 @@ class Publisher:
         with selectors.DefaultSelector() as waiting:
             waiting.register(self._listener, selectors.EVENT_READ)
             while not self._stop.wait(INTERVAL if self._clients else BREATH):
+                self._listen_again(waiting)
                 if waiting.select(0.0 if self._clients else INTERVAL):
                     self._accept()
                 if self._clients:
                     self._send(line_of(self._report()))
+
+    def _listen_again(self, waiting: selectors.BaseSelector) -> None:
+        """Make the socket anew where somebody removed it, or its folder, which is there again."""
+        if os.path.lexists(self.path) or not self.path.parent.is_dir():
+            return
+        with suppress(PublishError):  # it is tried again
+            listener = _listener(self.path)
+            waiting.unregister(self._listener)
+            self._listener.close()
+            waiting.register(listener, selectors.EVENT_READ)
+            self._listener = listener
 
     def _accept(self) -> None:
         """Take in everybody who waits; there is room for MAX_CLIENTS."""

@@ -1,4 +1,4 @@
-"""When the recording goes on in a new part: the present one is large, old, or gone."""
+"""When the recording goes on in a new part: the present one is large, old, failed, or gone."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ class Rotation:
     def due(self, logging: Logging, status: WriterStatus) -> bool:
         """Whether a part should begin now; once for each part."""
         age, part = time.monotonic() - self._began, status.files[-1]
+        if status.suspect and part != self._ended:
+            return self._end(part)
         if age < MIN_PART or status.state != "writing" or part == self._ended:
             return False
 
@@ -41,6 +43,9 @@ class Rotation:
         if size is not None and size <= largest and age <= longest:
             return False
 
+        return self._end(part)
+
+    def _end(self, part: Path) -> bool:
         self._began, self._ended = time.monotonic(), part
         return True
 

@@ -69,6 +69,11 @@ class Backlog:
         """How many takes empty the queue as it is, or write the batch that waits."""
         return 1 + len(self._items) // BATCH + self._starts
 
+    @property
+    def starts(self) -> int:
+        """PartStarts that wait."""
+        return self._starts
+
     def take(self) -> tuple[list[Item], int, str]:
         """The next messages, how many were dropped before them since the last take, and the
         configuration of a PartStart among those. A PartStart comes first in its batch.

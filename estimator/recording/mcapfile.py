@@ -165,6 +165,7 @@ class McapFile:
         self._chunk_indexes = ChunkIndexes(self._compression)
         self._counts: Counter[int] = Counter()
         self._indexed = True  # whether the index knows every chunk
+        self._whole = True  # whether the file ends with its last whole record
         self._span: tuple[int, int] | None = None  # first and last log_time [ns]
         self._length = 0
         self._crc = 0
@@ -307,6 +308,8 @@ class McapFile:
 
         try:
             with reported(self.path, "write"):
+                if not self._whole:
+                    self._take_back()
                 while view:
                     view = view[self._file.write(view) :]
         except (RecordingError, MemoryError):
@@ -316,9 +319,15 @@ class McapFile:
         self._length, self._crc = length, crc
 
     def _rewind(self) -> None:
+        """Take back what was written of a record; where that fails too, before the next one."""
+        self._whole = False
         with suppress(OSError):
-            self._file.truncate(self._length)
-            self._file.seek(self._length)
+            self._take_back()
+
+    def _take_back(self) -> None:
+        self._file.truncate(self._length)
+        self._file.seek(self._length)
+        self._whole = True
 
     def _chunk(self, content: bytes, span: tuple[int, int]) -> Chunk:
         return Chunk(

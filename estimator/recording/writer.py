@@ -57,6 +57,7 @@ class WriterStatus:
     queued: int  # waiting, or being written
     files: tuple[Path, ...]  # the run's parts so far
     unfit: int = 0  # of the dropped, those that could not be written because of themselves
+    suspect: bool = False  # the open file failed for another reason than a full disk
 
 
 class WriterThread:
@@ -132,6 +133,7 @@ class WriterThread:
             queued,
             tuple(self._parts.files),
             self._unfit,
+            self._suspect,
         )
 
     @property
@@ -199,12 +201,22 @@ class WriterThread:
         """Everything queued by now, in batches; first what an earlier attempt left."""
         self._sync.raise_error(self._parts.files[-1])
         if self._suspect:
-            self._parts.next(lost=0)
+            self._leave()
             self._suspect = False
         self._flush()
         for _ in range(self._queue.batches()):
             self._next_batch()
         self._state = "writing"
+
+    def _leave(self) -> None:
+        """Leave a file that failed. Where a PartStart waits, it takes what came before that, if it
+        can: so the next part begins with the first state. Otherwise it is left at once.
+        """
+        begun = bool(self._batch) and isinstance(self._batch[0], PartStart)
+        if begun or self._queue.starts:
+            with suppress(RecordingError):
+                return self._flush()
+        self._parts.next(lost=0)
 
     def _next_batch(self) -> None:
         if not self._batch:
@@ -296,6 +308,8 @@ class _Parts:
         paths = ((n, part_path(self.files[0], n)) for n in count(len(self.files)))
         number, path = next((n, path) for n, path in paths if not os.path.lexists(path))
         run = replace(self._run, part=number, lost_before=lost)
+        with suppress(OSError):  # what is amiss, making the file says
+            path.parent.mkdir(parents=True, exist_ok=True)
         new = self._make(path, config_yaml=config_yaml or self._config, run=run)
         self._config = config_yaml or self._config
         old, self.writer = self.writer, new

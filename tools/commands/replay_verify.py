@@ -17,6 +17,9 @@ from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError
 from gritd.tools.commands.replay_run import rerun_of, ticks_of
 
 SHOWN = 5  # differing fields named in full
+# why a tick cannot be compared
+NOT_BEGUN = "before the part's first state"
+LOST = "after lost messages"
 SEQUENCE, CONSUMED = TICK_NAMES.index("sequence"), TICK_NAMES.index("consumed")
 
 
@@ -28,14 +31,15 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
     _check(first)
 
     rerun = rerun_of(recordings, configuration, as_it_ran=True)
+    differences, gaps = Differences(), Gaps()
     if first.run.part or first.run.bed:  # it did not begin with the stated prior
         rerun.lose()
-
-    differences, gaps = Differences(), Gaps()
+        differences.why = NOT_BEGUN
 
     for recording, tick in ticks_of(recordings, configuration, "verifying"):
         if gaps.before(recording, tick):
             rerun.lose()
+            differences.why = LOST
         try:
             if tick.checkpoint is not None:
                 differences.resumed(tick.stamp, rerun.resume(tick.checkpoint))
@@ -46,7 +50,7 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
         if tick.logged is not None and rerun.known:
             differences.compare(tick.logged, record)
         elif tick.logged is not None:
-            differences.unknown += 1
+            differences.skip()
 
     print(
         f"{first.path}: {differences.compared} ticks, {len(TICK_NAMES)} fields each: {differences}"
@@ -134,7 +138,8 @@ class Differences:
 
     ticks: int = 0
     compared: int = 0
-    unknown: int = 0  # after a loss, before the next checkpoint
+    unknown: dict[str, int] = field(default_factory=dict)  # ticks not compared, by the reason
+    why: str = ""  # of those that come now
     lines: list[str] = field(default_factory=list)
 
     def resumed(self, stamp: int, same: bool) -> None:
@@ -145,6 +150,10 @@ class Differences:
                 f"checkpoint before the tick at {stamp}: "
                 "not the state that the ticks before it lead to"
             )
+
+    def skip(self) -> None:
+        """A tick whose state is not known."""
+        self.unknown[self.why] = self.unknown.get(self.why, 0) + 1
 
     def compare(self, logged: TickRow, computed: TickRow) -> None:
         """Count a tick; name what differs in it."""
@@ -159,8 +168,6 @@ class Differences:
 
     def __str__(self) -> str:
         if not self.ticks:
-            after = (
-                f"; {self.unknown} more after lost messages not comparable" if self.unknown else ""
-            )
-            return f"identical bit for bit{after}"
+            more = [f"; {n} more {why} not comparable" for why, n in self.unknown.items()]
+            return f"identical bit for bit{''.join(more)}"
         return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])

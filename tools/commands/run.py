@@ -65,15 +65,14 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
     """
     named = _folder_named(arguments)
     early = named if named and named.is_dir() else None
-    if early:
-        held.enter_context(locked(early))
+    lock = held.enter_context(locked(early)) if early else None
     from gritd.estimator.config.configuration import load
     from gritd.tools.service.serve import Service, serve
 
     configuration = load(arguments.config)
     folder = Path(arguments.directory or configuration.settings.logging.directory)
-    if folder != early:
-        held.enter_context(locked(folder))
+    if lock is None or folder != early:
+        lock = held.enter_context(locked(folder))
 
     run = _run_info(configuration.run, arguments)
     if arguments.fast:
@@ -83,7 +82,7 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
     if arguments.view:
         held.enter_context(shown(place))
     service = Service(
-        folder,
+        lock,
         run,
         place,
         arguments.status,

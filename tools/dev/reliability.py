@@ -96,6 +96,9 @@ ROWS = (
     "a file that is no DBC",
     "recover of a cut recording",
     "bed file that cannot be, or of another time",
+    "write error in the middle of a part",
+    "log folder removed during a run",
+    "recovery of the log",
 )
 
 Figure = dict[str, Any]

@@ -62,6 +62,7 @@ class Journal:
         self._hints = {reader.device: "" for reader in readers}
         self._steps = {reader.device: 0 for reader in readers}
         self._writing, self._files, self._hanging, self._unconfirmed = "writing", 1, "", False
+        self._dropped = 0  # messages, when the log began to fail
 
     def __call__(self, daemon: Daemon) -> None:
         now = daemon.clock.now() * NS
@@ -146,10 +147,19 @@ class Journal:
 
         status = daemon.writer.status()
         if status.state != self._writing:
-            self._writing = status.state
-            yield Notice(f"log {status.state} {status.error}", over=status.state != "degraded")
+            yield self._turned(status)
         yield from self._unfit(status, now)
         yield from self._parts(daemon, status)
+
+    def _turned(self, status: WriterStatus) -> Notice:
+        """The log fails, or is written again."""
+        self._writing = status.state
+        if status.state != "writing":
+            self._dropped = status.dropped
+            return Notice(f"log {status.state} {status.error}", over=status.state == "closed")
+        lost = status.dropped - self._dropped
+        what = f"{lost} messages were lost" if lost else "nothing was lost"
+        return Notice(f"log writing again, {what}: {status.files[-1]}", over=True)
 
     def _unfit(self, status: WriterStatus, now: float) -> Iterator[Notice]:
         """Messages that could not be written because of themselves."""

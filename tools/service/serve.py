@@ -17,6 +17,7 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.daemon.bed_file import BedError
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.daemon.daemon import INFO, WARNING, Daemon, DaemonError
+from gritd.estimator.daemon.lock import FolderLock
 from gritd.estimator.daemon.publish import Publisher, PublishError
 from gritd.estimator.daemon.scheduling import real_time
 from gritd.estimator.messages.run_info import RunInfo
@@ -48,12 +49,17 @@ class QueueSource:
 class Service:
     """What `gritd run` is told beside the configuration."""
 
-    folder: Path  # of the logs
+    lock: FolderLock  # of the logs
     run: RunInfo
     socket: Path
     status_every: float  # [s], 0 for never
     tap: Path | None = None  # folder to keep the raw bytes of every device in
     from_tap: Path | None = None  # folder of such bytes, in the place of the devices
+
+    @property
+    def folder(self) -> Path:
+        """Of the logs."""
+        return self.lock.folder
 
 
 def serve(configuration: Configuration, service: Service) -> int:
@@ -84,7 +90,9 @@ def _serve(configuration: Configuration, service: Service) -> int:
     run, start = (bed.named(service.run), bed.start) if bed else (service.run, None)
     daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock, start)
     publisher = Publisher(service.socket, Reporter(daemon, readers, queue, notice))
-    watcher = Watcher(configuration.source, readers, queue, publisher, service.status_every)
+    watcher = Watcher(
+        configuration.source, readers, queue, publisher, service.lock, service.status_every
+    )
 
     _listen_to_signals(daemon, watcher)
     _announce(daemon, path, notice)

@@ -14,6 +14,7 @@ from gritd.estimator.config.configuration import Configuration, reload
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.daemon import notify
 from gritd.estimator.daemon.daemon import INFO, WARNING, WATCH, Daemon, DaemonError
+from gritd.estimator.daemon.lock import FolderLock, LockError
 from gritd.estimator.daemon.loop import Change
 from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import Publisher
@@ -22,6 +23,7 @@ from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.recording.retention import trim
 from gritd.tools.service.journal import Journal, say, tell
 
+HOLD = 1.0  # [s] between looks at the log folder
 TIDY = 5.0  # [s] between looks at the disk
 
 
@@ -34,14 +36,16 @@ class Watcher:
         readers: Sequence[Reader],
         queue: ReadingQueue,
         publisher: Publisher,
+        lock: FolderLock,
         every: float,
     ) -> None:
         self._config, self._readers, self._queue = config, readers, queue
         self._journal = Journal(readers, queue, publisher)
         self._notifier = Notifier()
+        self._lock = lock
         self._every = every
 
-        self._untidy = ""
+        self._unheld = self._untidy = ""
         self._calls = 0
         self._ready = self._reload_asked = False
         self._loading: Thread | None = None  # of a configuration
@@ -61,6 +65,8 @@ class Watcher:
             self._loading = None
             self._end_reload(daemon)
 
+        if self._due(HOLD):
+            self._hold(daemon)
         if self._due(TIDY):
             self._tidy(daemon)
 
@@ -113,6 +119,20 @@ class Watcher:
                 daemon.reload(configuration, change)
             tell(daemon, INFO, f"{self._config}: {'reloaded' if change else 'unchanged'}")
         self._notifier.tell(notify.READY)
+
+    def _hold(self, daemon: Daemon) -> None:
+        """Make the log folder again where somebody removed it, and hold it as at the start."""
+        trouble = ""
+        try:
+            if self._lock.renew():
+                folder = self._lock.folder
+                tell(daemon, WARNING, f"{folder}: was removed while it was used; made again")
+        except LockError as error:
+            trouble = str(error)
+
+        if trouble and trouble != self._unheld:
+            tell(daemon, WARNING, trouble)
+        self._unheld = trouble
 
     def _tidy(self, daemon: Daemon) -> None:
         """Keep the recordings under their cap."""

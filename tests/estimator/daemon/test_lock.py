@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import socket
 
 import pytest
@@ -49,4 +50,16 @@ def test_a_place_where_no_socket_can_be_is_one_line(tmp_path):
     nowhere = tmp_path / "nowhere" / "gritd.sock"
     no_place = pytest.raises(LockError, match="cannot make the status socket: No such file")
     with no_place, alone_at(nowhere):
+        pass
+
+
+def test_a_folder_that_was_removed_is_made_and_held_again(tmp_path):
+    folder = tmp_path / "logs"
+    with locked(folder) as lock:
+        assert not lock.renew()
+        shutil.rmtree(folder)
+        assert lock.renew() and not lock.renew()
+        with pytest.raises(LockError, match="another gritd is logging here"), locked(folder):
+            pass
+    with locked(folder):
         pass

@@ -14,6 +14,7 @@ import pytest
 from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
 from gritd.tools.cli.command import CommandError
 from gritd.tools.service import client
+from tests.drivers.rig import wait_until
 from tests.estimator.daemon.reports import REPORT, publishing
 
 
@@ -59,6 +60,17 @@ def test_more_clients_than_there_is_room_for_are_turned_away(publisher):
     assert next(client.reports(connections[0]))["pid"] == 1
     for connection in connections:
         connection.close()
+
+
+def test_a_socket_that_somebody_removed_is_made_again(publisher):
+    with client.connected(str(publisher.path)) as before:
+        reports = client.reports(before)
+        assert next(reports)["pid"] == 1
+        os.unlink(publisher.path)
+        assert wait_until(publisher.path.is_socket)
+        assert next(reports)["pid"] == 1
+    with client.connected(str(publisher.path)) as connection:
+        assert next(client.reports(connection))["pid"] == 1
 
 
 def test_a_socket_that_a_dead_daemon_left_is_replaced_and_a_file_is_not(tmp_path):

@@ -13,6 +13,7 @@ from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
+from gritd.estimator.messages.update import update_of
 from gritd.estimator.online.bed import Start, begun
 from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import encode
@@ -54,7 +55,9 @@ class Source(Protocol):
 
 
 class Loop:
-    """Ticks until told to stop. `latest` is the last tick and loop record, for whoever watches."""
+    """Ticks until told to stop. `latest` is the last tick and loop record, `update` the last update
+    of the filter, for whoever watches.
+    """
 
     def __init__(
         self,
@@ -75,6 +78,7 @@ class Loop:
         self._lateness: deque[float] = deque(maxlen=RECENT)
 
         self.latest: tuple[TickRow, LoopRecord] | None = None
+        self.update: TickRow | None = None
         self.ticks = self.missed = 0
         self._start = start
         self.left: TrackState | None = None  # at the end
@@ -140,6 +144,7 @@ class Loop:
         self._sink.put(readings, tick, loop)
         self._lateness.append(loop.lateness)
         self.latest = (tick, loop)
+        self.update = update_of(tick) or self.update
         self.ticks += 1
 
     def _between(self, state: State, stamp: int) -> State:

@@ -16,6 +16,7 @@ INSTALL = {
     "starlette": "'gritd[view]'",
     "uvicorn": "'gritd[view]'",
     "metaflow-card-uplot": "'gritd[view]'",
+    "foxglove": "'gritd[foxglove]'",
 }
 
 

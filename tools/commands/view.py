@@ -6,8 +6,8 @@ import asyncio
 import os
 import socket
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
-from contextlib import closing, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,9 +19,11 @@ from gritd.tools.service.client import add_socket
 
 if TYPE_CHECKING:
     from gritd.tools.view.app import Hub
+    from gritd.tools.view.foxglove import Relay
     from gritd.tools.view.server import Place
 
 NEEDS = ("starlette", "uvicorn")
+FOXGLOVE = 8765  # the port that Foxglove looks at
 BEHIND = 5  # nice: the page waits for the daemon, never the daemon for the page
 DEFAULT_PORT = 8250
 MOST = 50  # recordings of a page
@@ -33,6 +35,8 @@ def main(argv: Sequence[str]) -> int:
     arguments = _parser().parse_args(argv)
     for package in NEEDS:
         require(package, "gritd view")
+    if arguments.foxglove is not None:
+        require("foxglove", "gritd view --foxglove")
     _serve(arguments)
     return DONE
 
@@ -50,6 +54,11 @@ def _serve(arguments: Namespace) -> None:
             USAGE,
         )
 
+    if arguments.foxglove is not None and (arguments.files or not place.loopback):
+        where = "recordings" if arguments.files else f"--host {place.host}"
+        expected = "expected the running daemon, seen from this computer alone: it asks no token"
+        raise CommandError(f"--foxglove: found {where}; {expected} (docs/view.md)", USAGE)
+
     serve = _recorded if arguments.files else _live
     serve(arguments, place, library())
 
@@ -61,16 +70,34 @@ def _live(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None
     from gritd.tools.view.server import listening, serve
 
     hub, feed = Hub(), Feed(arguments.socket)
-    with closing(listening(place, arguments.any_port)) as listener, closing(feed):
+    with (
+        closing(listening(place, arguments.any_port)) as listener,
+        _relaying(arguments.foxglove, place) as relay,
+        closing(feed),
+    ):
 
         def begin() -> None:
             loop = asyncio.get_running_loop()
-            feed.start(lambda frame: _push(loop, hub, frame))
+            feed.start(lambda frame: _push(loop, hub, frame), relay.take if relay else None)
             _announce(place, listener)
+            if relay:
+                print(f"foxglove ws://{place.host}:{relay.port}/", flush=True)
 
         with suppress(OSError):
             os.nice(BEHIND)
         serve(live(feed, files, hub), place, listener, begin)
+
+
+@contextmanager
+def _relaying(port: int | None, place: Place) -> Iterator[Relay | None]:
+    """Raises CommandError where the port is not free."""
+    if port is None:
+        yield None
+        return
+    from gritd.tools.view.foxglove import Relay
+
+    with closing(Relay(place.host, port)) as relay:
+        yield relay
 
 
 def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
@@ -168,6 +195,14 @@ def _parser() -> Parser:
         default=[],
         metavar="HOST",
         help="a further name under which browsers reach this computer",
+    )
+    parser.add_argument(
+        "--foxglove",
+        nargs="?",
+        type=whole(0, 65535),
+        const=FOXGLOVE,
+        metavar="N",
+        help=f"serve /tick, /update and /loop to Foxglove too, at port N (default {FOXGLOVE})",
     )
     parser.add_argument(
         "--token-file",

@@ -18,6 +18,7 @@ from gritd.drivers.sensor import Sensor
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.messages.update import UPDATE_NAMES
 from gritd.tools.service.setup import setup
 
 Report = dict[str, Any]
@@ -91,12 +92,14 @@ class Reporter:
 
 
 def _tick(daemon: Daemon) -> Report:
-    """The latest tick and what the loop says of it; empty before the first."""
+    """The latest tick, what the loop says of it, and the latest update; empty before the first."""
     loop = {"ticks": daemon.loop.ticks, **daemon.loop.lateness()}
     if daemon.loop.latest is None:
-        return {"status": "STARTING", "flags": [], "tick": {}, "loop": loop, "channels": {}}
+        none: Report = {"tick": {}, "update": {}, "channels": {}}
+        return {"status": "STARTING", "flags": [], "loop": loop, **none}
 
     tick, record = daemon.loop.latest
+    update = daemon.loop.update
     fields = dict(zip(TICK_NAMES, tick, strict=True))
 
     return {
@@ -104,6 +107,7 @@ def _tick(daemon: Daemon) -> Report:
         "flags": [flag.name for flag in Flag if flag and int(fields["flags"]) & flag],
         "channels": {name: _condition(fields, bit) for name, bit in channels_of(daemon).items()},
         "tick": fields,
+        "update": dict(zip(UPDATE_NAMES, update, strict=True)) if update else {},
         "loop": {**record._asdict(), **loop},
     }
 

@@ -31,6 +31,7 @@ LIVE = (*CHARTS, LATENESS)
 PATH = 300  # points of the way of (c, tan φ)
 
 Told = Callable[[bytes], None]
+Taken = Callable[[Report], None]
 
 
 class Feed:
@@ -39,6 +40,7 @@ class Feed:
     def __init__(self, socket: str | None) -> None:
         self._socket = socket
         self._told: Told = _nobody
+        self._taken: Taken = _nobody
         self._history = History(fields_of(LIVE))
         self._events = Events()
         self._lock = Lock()
@@ -47,9 +49,9 @@ class Feed:
         self._trouble = ""
         self._thread = Thread(target=self._run, name="feed", daemon=True)
 
-    def start(self, told: Told) -> None:
-        """`told` gets a frame as JSON for every report, from the thread."""
-        self._told = told
+    def start(self, told: Told, taken: Taken | None = None) -> None:
+        """`told` gets a frame as JSON for every report, `taken` the report; from the thread."""
+        self._told, self._taken = told, taken or _nobody
         self._thread.start()
 
     def close(self) -> None:
@@ -108,6 +110,7 @@ class Feed:
         try:
             with self._lock:
                 told = self._told_of(report)
+            self._taken(report)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
             raise CommandError(NO_GRITD) from None
         self._told(told)
@@ -150,8 +153,8 @@ class Feed:
         self._told(_encoded({"time": None, "row": None, "marks": marks, "headline": words}))
 
 
-def _nobody(frame: bytes) -> None:
-    """Before the start."""
+def _nobody(what: object) -> None:
+    """Nobody wants to know."""
 
 
 def _time(report: Report) -> float:

@@ -53,3 +53,12 @@ def test_without_the_extra_the_line_to_install_it_is_told(monkeypatch: pytest.Mo
     monkeypatch.setattr(library.metadata, "files", lambda name: None)
     error = refused("--port", "0")
     assert error.code == 2 and "gritd[view]" in str(error)
+
+
+def test_foxglove_is_served_the_daemon_on_this_computer_alone(tmp_path: Path) -> None:
+    token = tmp_path / "token"
+    token.write_text("0123456789abcdef\n")
+    beyond = ("--host", "0.0.0.0", "--token-file", str(token), "--foxglove")
+    for options in (beyond, (str(tmp_path / "run.mcap"), "--foxglove")):
+        error = refused(*options)
+        assert error.code == 2 and "--foxglove" in str(error)

@@ -10,7 +10,8 @@ from typing import Any
 
 from gritd.estimator.daemon.publish import Publisher
 from gritd.estimator.messages.status import CHANNEL_BITS
-from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.messages.tick import TICK_NAMES, LoopRecord
+from gritd.estimator.messages.update import UPDATE_NAMES
 
 BEGAN = 1_790_000_000.0  # [s]
 TICK = {
@@ -45,6 +46,8 @@ def report(at: float = 0.0, tick: Mapping[str, Any] = {}, **changes: Any) -> dic
     """A report `at` seconds after BEGAN."""
     sequence = round(250 * at)
     stamp = round((BEGAN + at) * 1e9)
+    loop = {**dict.fromkeys(LoopRecord._fields, 0), "stamp": stamp, "ticks": sequence}
+    update = {**dict.fromkeys(UPDATE_NAMES, 0.0), "torque_sigmas": None, "updates": 77}
     return {
         "pid": 77,
         "uptime": at,
@@ -58,9 +61,9 @@ def report(at: float = 0.0, tick: Mapping[str, Any] = {}, **changes: Any) -> dic
         "status": "TRACKING",
         "flags": [],
         "channels": dict.fromkeys(CHANNEL_BITS, "ok"),
-        "tick": {**TICK, "evaluated": stamp, "sequence": sequence, **tick},
-        "loop": {"ticks": sequence, "missed": 0, "lateness": 1e-4, "late_50": 1e-4,
-                 "late_99": 2e-4, "late_max": 3e-4},
+        "tick": {**TICK, "stamp": stamp, "evaluated": stamp, "sequence": sequence, **tick},
+        "update": {**update, "stamp": stamp, "evaluated": stamp},
+        "loop": {**loop, "lateness": 1e-4, "late_50": 1e-4, "late_99": 2e-4, "late_max": 3e-4},
         "disagreement": None,
         "queue": {"received": 5, "processed": 5, "dropped": 0, "queued": 0},
         "devices": {"encoders": DEVICE, "bus": DEVICE},

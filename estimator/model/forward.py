@@ -97,15 +97,47 @@ def carried(
     near: of an earlier call with nearby parameters: the balance starts there.
     """
     effects = in_order(effects)
+    wheel, situation, soil, law = touched(wheel, soil, motion, effects)
+
+    solved = _balance(wheel, soil, law, motion, situation, effects, near, order)
+    return Carried(wheel, situation, solved)
+
+
+def carried_at(
+    wheel: Wheel, soil: Soil, motion: Motion, effects: Sequence[Effect], theta_1: Array
+) -> Carried:
+    """As `carried`, but at measured entry angles θ₁ (n,) [rad] in the place of predicted ones, with
+    the sinkage modulus that carries the load of the motion there.
+
+    effects: sensors' effects on θ₁ and the load are undone already.
+    """
+    wheel, situation, soil, law = touched(wheel, soil, motion, in_order(effects))
+    bare, stated = (
+        balance.rim_forces(
+            wheel,
+            balance.Contact(replace(soil, modulus=modulus), law, situation.slip, situation.load),
+            theta_1,
+        )
+        for modulus in (0.0, soil.modulus)
+    )
+
+    share = (situation.load - bare.load) / (stated.load - bare.load)  # forces are linear in it
+    forces = Forces(*(low + share * (high - low) for low, high in zip(bare, stated, strict=True)))
+    none = np.zeros(theta_1.shape)
+    return Carried(wheel, situation, balance.Balance(theta_1, forces, none, none))
+
+
+def touched(
+    wheel: Wheel, soil: Soil, motion: Motion, effects: Sequence[Effect]
+) -> tuple[Wheel, Situation, Soil, ContactLaw]:
+    """The true wheel, its situation, the soil under it and the contact, effects in order."""
     wheel, situation = prepare(wheel, motion, effects)
     soil = reduce(lambda soil, e: e.soil(soil, situation), effects, soil)
     situation = replace(
         situation, cohesion=soil.cohesion, tan_phi=soil.tan_phi, shear_modulus=soil.shear_modulus
     )
     law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
-
-    solved = _balance(wheel, soil, law, motion, situation, effects, near, order)
-    return Carried(wheel, situation, solved)
+    return wheel, situation, soil, law
 
 
 def responded(
@@ -119,14 +151,23 @@ def responded(
     `simulate_arrays`.
     """
     effects = in_order(effects)
-    balanced = solved.balance
-    situation = loaded(solved.situation, solved.wheel, balanced.theta_1, balanced.forces)
-    reaction = corrected_form(react(situation, effects), situation, correction)
+    situation, reaction = felt(solved, effects, correction)
     situation, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
 
-    return _response(situation, balanced, reaction, motor_torque, effects)
+    return _response(situation, solved.balance, reaction, motor_torque, effects)
+
+
+def felt(
+    solved: Carried, effects: Sequence[Effect], correction: Correction | None = None
+) -> tuple[Situation, Reaction]:
+    """The situation under the balance, and what axle and testbed make of it, before drive and
+    sensors.
+    """
+    balanced = solved.balance
+    situation = loaded(solved.situation, solved.wheel, balanced.theta_1, balanced.forces)
+    return situation, corrected_form(react(situation, in_order(effects)), situation, correction)
 
 
 def _response(

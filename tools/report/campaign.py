@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from gritd.estimator.effects import EFFECTS
 from gritd.estimator.filter.estimate import KPA, TAN_PHI, C, Estimate
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.cli.wording import honesty, listed, percent
+from gritd.tools.cli.wording import honesty, listed, number, percent, spaced
 from gritd.tools.report import figures, lab, masthead, plot, redo
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
-from gritd.tools.report.lab import Beside, LabRun
-from gritd.tools.report.words import counted, held, sentence, stopped, uncertain
+from gritd.tools.report.lab import Beside, LabRun, joined
+from gritd.tools.report.words import counted, held, name_of, sentence, stopped, uncertain
 
-FORCES = {"torque": "T [N·m]", "drawbar_pull": "DP [N]"}
+FORCES = {"torque": ("T [N·m]", "N·m"), "drawbar_pull": ("DP [N]", "N")}  # label, unit
 SOIL = {  # field -> label, factor
     "cohesion": ("c [Pa]", 1.0),
     "tan_phi": ("tan φ", 1.0),
@@ -93,27 +94,19 @@ def _summary(campaign: Campaign) -> str:
 
 
 def _differences(campaign: Campaign) -> str:
-    """Of both forms from what was measured, over all runs, weighted by their windows."""
-    parts = []
-    for channel, label in FORCES.items():
-        off = {which: _off(campaign, channel, which) for which in ("original", "closed")}
-        if isfinite(off["original"]):
-            parts.append(
-                f"{label.split(' ')[0]} differs from the original equations by "
-                f"{off['original']:.1%} and from the closed form by {off['closed']:.1%}"
-            )
-    return sentence(listed(parts)) if parts else ""
-
-
-def _off(campaign: Campaign, channel: str, which: str) -> float:
-    offs = [
-        (run.beside.off(channel, which), len(run.beside.slip))
-        for run in campaign.runs
-        if run.beside and isfinite(run.beside.off(channel, which))
+    """Of both forms from what was measured, over the windows of all runs."""
+    every = [run.beside for run in campaign.runs if run.beside is not None]
+    if not every:
+        return ""
+    of = joined(every)
+    parts = [
+        f"{label.split(' ')[0]} differs by {spaced(of.off(channel, 'original'), unit, 2)} from the "
+        f"original equations and by {spaced(of.off(channel, 'closed'), unit, 2)} from the closed "
+        f"form, of which {spaced(of.noise(channel), unit, 2)} is noise"
+        for channel, (label, unit) in FORCES.items()
+        if isfinite(of.off(channel, "original"))
     ]
-    if not offs:
-        return float("nan")
-    return sum(off * count for off, count in offs) / sum(count for _, count in offs)
+    return " ".join(map(sentence, parts))
 
 
 # --- forces ---
@@ -124,9 +117,9 @@ def _forces(campaign: Campaign) -> Markup | None:
     if not of:
         return None
     note = (
-        "Both forms at the measured entry angle, slip and load, with the soil that all runs "
-        "together know. The percentages are mean differences of the original equations and of the "
-        "closed form from what was measured, in shares of the mean measured size."
+        "Both forms at the measured entry angle, slip and load, with the soil that the runs "
+        f"together know and {_effects(of)}. Beside each load stand the root mean square differences "
+        "from what was measured."
     )
     return section("Drawbar pull and torque against slip", tag("p", note), _drawn_forces(of))
 
@@ -140,11 +133,11 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
         for part in run.beside.by_load()
     ]
 
-    for channel, label in FORCES.items():
+    for channel, (label, unit) in FORCES.items():
         drawn = [
             (
                 part.off(channel, "original"),
-                figures.panel(name, _over_slip(part, channel, label), _share(part, channel)),
+                figures.panel(name, _over_slip(part, channel, label), _errors(part, channel, unit)),
             )
             for name, part in parts
             if isfinite(part.off(channel, "original"))
@@ -170,9 +163,18 @@ def _in_view(drawn: Sequence[tuple[float, Markup]]) -> Iterator[Markup]:
         yield tag("details", summary, folded, class_="unprinted")
 
 
-def _share(part: Beside, channel: str) -> str:
+def _errors(part: Beside, channel: str, unit: str) -> str:
     """How far both forms are off."""
-    return ", ".join(f"{which} {part.off(channel, which):.1%}" for which in ("original", "closed"))
+    off = (f"{which} {number(part.off(channel, which), 2)}" for which in ("original", "closed"))
+    return f"{', '.join(off)} {unit}"
+
+
+def _effects(of: Sequence[LabRun]) -> str:
+    """What the configuration adds to both forms."""
+    settings = of[0].run.settings
+    names = [name_of(e.name) for e in settings.effects if not EFFECTS[e.name].filter_only]
+    names += ["learnt form error"] if settings.discrepancy is not None else []
+    return f"the configured {listed(names)}" if names else "no effects"
 
 
 def _over_slip(of: Beside, channel: str, label: str) -> Markup:

@@ -12,14 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.estimate import soil as soil_of
 from gritd.estimator.messages.status import UPDATED
+from gritd.estimator.model.correction import Correction
+from gritd.estimator.model.forward import Carried, carried_at, felt
 from gritd.estimator.offline.bed_runs import BedRun, bed_runs
 from gritd.estimator.offline.playback import without_absent
+from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.recording import Recording
-from gritd.estimator.terramechanics import linear, original
+from gritd.estimator.stages.situation import Motion, Reaction
+from gritd.estimator.terramechanics import linear
+from gritd.estimator.terramechanics.original import Forces
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.cli.wording import NOTHING, fixed
 from gritd.tools.diagnose.explain.result import Diagnosis
@@ -32,6 +38,7 @@ UNDATED = 978_307_200_000_000_000  # [ns] 2001: files that do not say when begin
 PIECE = 1 << 20  # [bytes] that are hashed at once
 ANOTHER_LOAD = 0.05  # relative gap between the windows of two loads
 FEWEST = 5  # windows of a load
+CHANNELS = ("torque", "drawbar_pull")
 
 
 @dataclass(frozen=True)
@@ -41,23 +48,23 @@ class Beside:
     slip: Array
     load: Array  # [N]
     measured: dict[str, Array]  # torque [N·m], drawbar_pull [N]
+    sigma: dict[str, Array]  # of their noise
     original: dict[str, Array]  # by Eqs. (1)-(10), with the modulus that carries the load
     closed: dict[str, Array]  # by Eqs. (20)-(22)
 
     def off(self, channel: str, which: str) -> float:
-        """Mean |difference| from what was measured, as a share of the mean measured size; NaN where
-        the channel was not measured.
+        """Root mean square difference from what was measured [the channel's unit]; NaN where the
+        channel was not measured.
         """
-        measured, computed = self.measured[channel], getattr(self, which)[channel]
-        good = np.isfinite(measured)
-        if not good.any():
-            return float("nan")
-        size = np.mean(np.abs(measured[good]))
-        return float(np.mean(np.abs(computed[good] - measured[good])) / size)
+        return _rms(getattr(self, which)[channel] - self.measured[channel])
+
+    def noise(self, channel: str) -> float:
+        """Root mean square σ of what was measured [the channel's unit]."""
+        return _rms(self.sigma[channel])
 
     def at(self, index: NDArray[np.intp]) -> Beside:
         """Some of the windows (n,)."""
-        forces = (self.measured, self.original, self.closed)
+        forces = (self.measured, self.sigma, self.original, self.closed)
         chosen = ({name: values[index] for name, values in each.items()} for each in forces)
         return Beside(self.slip[index], self.load[index], *chosen)
 
@@ -70,6 +77,23 @@ class Beside:
         groups = np.split(order, np.flatnonzero(apart) + 1)
         kept = [g for g in groups if len(g) >= FEWEST] or [order]
         return [self.at(np.sort(group)) for group in kept]
+
+
+def joined(parts: Sequence[Beside]) -> Beside:
+    """The windows of several, one after the other."""
+    slip, load = (np.concatenate([getattr(p, name) for p in parts]) for name in ("slip", "load"))
+    of = ("measured", "sigma", "original", "closed")
+    forces = (
+        {c: np.concatenate([getattr(part, name)[c] for part in parts]) for c in CHANNELS}
+        for name in of
+    )
+    return Beside(slip, load, *forces)
+
+
+def _rms(values: Array) -> float:
+    """Of those (n,) that are known; NaN where none is."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 @dataclass(frozen=True)
@@ -110,60 +134,68 @@ def sha256(recording: Recording) -> str:
 
 
 def beside(run: BedRun, estimate: Estimate) -> Beside | None:
-    """Both forms of the equations at the windows of a run, at an estimate of the soil."""
+    """Both forms of the equations at the windows of a run, at an estimate of the soil, with the
+    effects and the discrepancy of the configuration: what `gritd diagnose` simulates, at the
+    measured entry angle. None where the filter was never updated.
+    """
     rows = run.carried.rows
-    rows = rows[np.isin(rows["status"], UPDATED) & (rows["theta_1"] > 0.0)]
-    if not len(rows):
+    needed = ("wheel_speed", "carriage_speed", "load", "theta_1")
+    known = np.all([np.isfinite(rows[name]) for name in needed], axis=0)
+    rows = rows[known & (rows["theta_1"] > 0.0)]
+    used = np.isin(rows["status"], UPDATED)
+    if not used.any():
         return None
 
-    slip, load, theta_1 = (np.asarray(rows[name]) for name in ("slip", "load", "theta_1"))
-    measured = {name: np.asarray(rows[name]) for name in ("torque", "drawbar_pull")}
+    original, closed = _both_forms(run.settings, estimate, rows)
     return Beside(
-        slip,
-        load,
-        measured,
-        _original(run.settings, estimate, theta_1, slip, load),
-        _closed(run.settings, estimate, theta_1, slip, load),
+        np.asarray(rows["slip"]),
+        np.asarray(rows["load"]),
+        {name: np.asarray(rows[name]) for name in CHANNELS},
+        {name: np.asarray(rows[f"{name}_sigma"]) for name in CHANNELS},
+        {name: np.asarray(getattr(original, name)) for name in CHANNELS},
+        {name: np.asarray(getattr(closed, name)) for name in CHANNELS},
+    ).at(np.flatnonzero(used))
+
+
+def _both_forms(settings: Settings, estimate: Estimate, rows: Rows) -> tuple[Reaction, Reaction]:
+    """What axle and testbed feel by Eqs. (8)-(10) and by Eqs. (20)-(22) at windows (n,)."""
+    effects, known = configured(settings.effects), settings.soil
+    modulus = known.pressure_sinkage.modulus(settings.wheel.width)
+    soil = Soil(*soil_of(estimate), known.exponent.value, modulus)
+    learnt = None if settings.discrepancy is None else Correction(settings.discrepancy)
+
+    solved = carried_at(settings.wheel, soil, _motion(settings, rows), effects, rows["theta_1"])
+    closed = solved.balance._replace(forces=_closed(solved))
+    _, by_original = felt(solved, effects, learnt)
+    _, by_closed = felt(replace(solved, balance=closed), effects, learnt)
+    return by_original, by_closed
+
+
+def _motion(settings: Settings, rows: Rows) -> Motion:
+    """Of the windows (n,) of one run, the wheel's load in the place of the weights."""
+    measured = ("wheel_angle", "wheel_speed", "carriage_speed", "load", "temperature")
+    return Motion(
+        time=(rows["evaluated"] - rows["evaluated"][0]) * NS,
+        carriage_position=rows["carriage_position"] - rows["carriage_position"][0],
+        pass_number=float(settings.place.pass_number),
+        start_position=settings.place.start_position,
+        **{name: np.asarray(rows[name]) for name in measured},
     )
 
 
-def _original(
-    settings: Settings, estimate: Estimate, theta_1: Array, slip: Array, load: Array
-) -> dict[str, Array]:
-    """T and DP (n,) of Eqs. (8)-(10). Both follow the sinkage modulus in a straight line, so it is
-    taken as that which carries the load at the measured entry angle.
+def _closed(solved: Carried) -> Forces:
+    """Forces (n,) of Eqs. (20)-(22) with σₘ from (21), at the soil and the motion under the wheel,
+    without what contact effects change of the stresses' shape.
     """
-    c, tan_phi, k = soil_of(estimate)
-    modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
-    none, stated = (
-        original.forces(
-            settings.wheel,
-            Soil(c, tan_phi, k, settings.soil.exponent.value, value),
-            theta_1,
-            slip,
-        )
-        for value in (0.0, modulus)
+    here, theta_1 = solved.situation, solved.balance.theta_1
+    c, tan_phi, k, slip, load = (
+        np.broadcast_to(np.asarray(value, float), theta_1.shape)
+        for value in (here.cohesion, here.tan_phi, here.shear_modulus, here.slip, here.load)
     )
-    share = (load - none.load) / (stated.load - none.load)
-
-    def at_load(name: str) -> Array:
-        low, high = getattr(none, name), getattr(stated, name)
-        return np.asarray(low + share * (high - low))
-
-    return {name: at_load(name) for name in ("torque", "drawbar_pull")}
-
-
-def _closed(
-    settings: Settings, estimate: Estimate, theta_1: Array, slip: Array, load: Array
-) -> dict[str, Array]:
-    """T and DP (n,) of Eqs. (20) and (22) with σₘ from (21), without any correction."""
-    c, tan_phi, k = soil_of(estimate)
-    states = zip(theta_1.tolist(), slip.tolist(), load.tolist(), strict=True)
-    at = [
-        linear.forces_under_load(settings.wheel, c, tan_phi, k, angle, i, weight)
-        for angle, i, weight in states
-    ]
-    return {name: np.array([getattr(f, name) for f in at]) for name in ("torque", "drawbar_pull")}
+    by = linear.forces_under_load(
+        solved.wheel, c, tan_phi, k, theta_1, slip, load, maths=linear.ARRAYS
+    )
+    return Forces(*(np.asarray(getattr(by, name)) for name in Forces._fields))
 
 
 # --- the table of runs ---

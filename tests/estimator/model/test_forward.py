@@ -139,6 +139,23 @@ def test_a_solution_near_by_costs_no_digits(factor: float) -> None:
     np.testing.assert_allclose(np.array(found.forces), np.array(there), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "effect", ["rear_contact", "slip_sinkage", "shear_peak", "sidewall_friction", "grousers"]
+)
+def test_at_the_balances_entry_angle_any_modulus_gives_its_forces(effect: str) -> None:
+    motion, effects = steady(), [typical(EFFECTS[effect])]
+    solved = forward.carried(WHEEL, SOIL, motion, effects)
+    stiffer = replace(SOIL, modulus=1.3 * SOIL.modulus)
+    at = forward.carried_at(WHEEL, stiffer, motion, effects, solved.balance.theta_1)
+
+    for here, there in zip(at.balance.forces, solved.balance.forces, strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-6)
+    _, reaction = forward.felt(at, effects)
+    response = forward.responded(solved, effects)
+    np.testing.assert_allclose(reaction.torque, response.torque, rtol=1e-6)
+    np.testing.assert_allclose(reaction.drawbar_pull, response.drawbar_pull, rtol=1e-6, atol=1e-6)
+
+
 def test_samples_do_not_depend_on_their_neighbours() -> None:
     slip, load = (
         np.linspace(0.0, 0.8, 3 * balance.CHUNK),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,7 +12,7 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config.configuration import load
-from gritd.estimator.config.settings import settings_of_run
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain, settings_of_run
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.recording.salvage import read
 from gritd.tools import main as cli
@@ -47,8 +48,33 @@ def test_the_original_equations_are_what_a_simulated_run_obeys(of: list[lab.LabR
     for run in of:
         assert run.beside is not None
         for channel in ("torque", "drawbar_pull"):
-            assert run.beside.off(channel, "original") < 0.02
+            noise = run.beside.noise(channel)
+            assert run.beside.off(channel, "original") < 4.0 * noise
         assert run.beside.off("torque", "closed") > 2.0 * run.beside.off("torque", "original")
+
+
+@pytest.mark.parametrize("effect, value", [("bed_slope.angle", 0.1), ("bulldozing.share", 1.0)])
+def test_the_curves_have_the_configured_effects(effect: str, value: float, tmp_path: Path) -> None:
+    """As the simulation of `gritd diagnose` has them."""
+    (tmp_path / "s.yaml").write_text(
+        "segments:\n  - {duration: 6 s, load: 70 N, slip: 0.3, speed: 20 mm/s}\n"
+    )
+    run = tmp_path / "run.mcap"
+    told = ["--schedule", str(tmp_path / "s.yaml"), "--effect", f"{effect}={value}", "-o", str(run)]
+    assert simulate.main(told) == 0
+
+    name, _, parameter = effect.partition(".")
+    settings, known = load(packaged()).settings, Uncertain(value, 0.0)
+    knowing = replace(
+        settings, effects=(*settings.effects, ConfiguredEffect(name, {parameter: known}))
+    )
+    offs = []
+    for each in (settings, knowing):
+        given = [(settings_of_run(each, recording.run), recording) for recording in [read(run)]]
+        (made,) = lab.lab_runs(list(bed_runs(given, each.bed.repeatability)))
+        assert made.beside is not None
+        offs.append(made.beside.off("drawbar_pull", "original") / made.beside.noise("drawbar_pull"))
+    assert offs[1] < 3.0 and offs[0] > 10.0
 
 
 def test_the_table_has_load_slips_duration_and_hash(of: list[lab.LabRun], runs: list[Path]) -> None:
@@ -66,7 +92,7 @@ def test_the_page_is_whole_and_says_what_all_runs_know(
     assert cli.main(["report", *map(str, runs), "-o", str(out)]) == 0
     page = out.read_text(encoding="utf-8")
     ElementTree.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
-    for words in ("2 runs together know the soil as c", "differs from the original equations by",
+    for words in ("2 runs together know the soil as c", "from the original equations",
                   "at45", "wheel_encoder", "SHA-256"):  # fmt: skip
         assert words in page
     assert np.count_nonzero([line == str(out) for line in capsys.readouterr().out.split()]) == 1
@@ -113,14 +139,6 @@ def test_loads_of_one_run_are_told_apart(of: list[lab.LabRun]) -> None:
     assert first is not None and second is not None
     changing = first.at(np.arange(2))
     changing.load[:] = (60.0, 75.0)
-    every = (second, first, changing)
-
-    def forces(which: str) -> dict[str, np.ndarray]:
-        return {c: np.concatenate([getattr(b, which)[c] for b in every]) for c in of_forces}
-
-    of_forces = ("torque", "drawbar_pull")
-    slip, load_ = (np.concatenate([getattr(b, name) for b in every]) for name in ("slip", "load"))
-    joined = lab.Beside(slip, load_, forces("measured"), forces("original"), forces("closed"))
-    light, heavy = joined.by_load()
+    light, heavy = lab.joined([second, first, changing]).by_load()
     assert (light.slip.tolist(), heavy.slip.tolist()) == (first.slip.tolist(), second.slip.tolist())
     assert light.off("torque", "closed") == pytest.approx(first.off("torque", "closed"))

@@ -4,7 +4,7 @@ import {path, picture, span, svgTicks} from "./pictures.js";
 import {byId, made} from "./tell.js";
 
 const BOX = {left: 56, right: 470, top: 26, bottom: 262};
-const FORCES = [["torque", "torque T [N·m]", "T"], ["drawbar_pull", "drawbar pull DP [N]", "DP"]];
+const FORCES = [["torque", "torque T [N·m]", "T", "N·m"], ["drawbar_pull", "drawbar pull DP [N]", "DP", "N"]];
 const COLOURS = 6;
 
 export const campaign = async () => {
@@ -27,7 +27,7 @@ export const campaign = async () => {
 
 const pair = (known, decimals) => `${written(known.value, decimals)} ± ${written(known.sigma, decimals)}`;
 
-const drawn = (told, name, label, symbol) => {
+const drawn = (told, name, label, symbol, unit) => {
   const parts = told.runs.flatMap(run => run.loads.map(load => ({...load, run: run.name, of: load[name]})))
     .filter(part => part.of.measured.some(v => v !== null));
   if (parts.length === 0) return null;
@@ -49,10 +49,10 @@ const drawn = (told, name, label, symbol) => {
     words(`${load} N`, BOX.right - 52 * i, BOX.top - 10, `run-text-${group % COLOURS + 1}`));
 
   const off = which => {
-    const known = parts.filter(part => part.of.off[which] !== null);
-    return written(100 * known.reduce((sum, part) => sum + part.of.off[which] * part.slip.length, 0) / known.reduce((sum, part) => sum + part.slip.length, 0), 1);
+    const known = parts.filter(part => part.of.off[which] !== null), count = known.reduce((sum, part) => sum + part.slip.length, 0);
+    return written(Math.sqrt(known.reduce((sum, part) => sum + part.of.off[which] ** 2 * part.slip.length, 0) / count), 3);
   };
-  const said = `${symbol} against slip. What was measured differs from the original equations by ${off("original")} %, from the closed form by ${off("closed")} % of its mean size.`;
+  const said = `${symbol} against slip. What was measured differs by ${off("original")} ${unit} from the original equations, by ${off("closed")} ${unit} from the closed form (root mean square).`;
   figure.appendChild(made("figcaption", said));
   svg.setAttribute("aria-label", said);
   return figure;

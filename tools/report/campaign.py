@@ -118,8 +118,8 @@ def _forces(campaign: Campaign) -> Markup | None:
         return None
     note = (
         "Both forms at the measured entry angle, slip and load, with the soil that the runs "
-        f"together know and {_effects(of)}. Beside each load stand the root mean square differences "
-        "from what was measured."
+        f"together know and {_effects(of)}. Beside each load stand the root mean square "
+        "differences from what was measured."
     )
     return section("Drawbar pull and torque against slip", tag("p", note), _drawn_forces(of))
 

@@ -4,13 +4,23 @@ it was made from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from gritd.tools.cli.wording import listed, number, percent, shown
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, SoilFit
 from gritd.tools.report import masthead, tables
 from gritd.tools.report.html import Markup, tag
-from gritd.tools.report.words import counted, held, name_of, nats, probability, quantity, with_unit
+from gritd.tools.report.hypotheses import in_order
+from gritd.tools.report.words import (
+    counted,
+    either,
+    held,
+    name_of,
+    nats,
+    probability,
+    quantity,
+    with_unit,
+)
 
 VERDICTS = {  # verdict -> its name, and what it means
     "consistent": ("Consistent", "Model and recordings agree within the noise."),
@@ -27,8 +37,10 @@ RUNS, RIG = "runs", "rig"  # keys of `Diagnosis.redo`, which the first page tell
 def verdict(diagnosis: Diagnosis) -> Markup:
     """The verdict in one paragraph, the numbers behind it, and of which rig and day it is."""
     name, meaning = VERDICTS[diagnosis.verdict]
-    effects = [_or_alike(h) for h in diagnosis.accepted]
-    title = f"{name}: {listed(effects)}" if diagnosis.verdict == "explained" and effects else name
+    explained = diagnosis.verdict == "explained"
+    equals = [simplest_first(diagnosis, h) for h in diagnosis.accepted] if explained else []
+    effects = [_or_alike(group) for group in equals]
+    title = f"{name}: {listed(effects)}" if effects else name
 
     runs = {trace.run for trace in diagnosis.traces}
 
@@ -36,6 +48,7 @@ def verdict(diagnosis: Diagnosis) -> Markup:
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
+        _equals(equals),
         tag("p", held(tables.named(diagnosis, diagnosis.summary)), class_="summary"),
         tag("dl", (_figure(*figure) for figure in _figures(diagnosis)), class_="figures"),
         masthead.masthead(diagnosis.redo.get(RIG, ""), diagnosis.redo.get(RUNS, ()))
@@ -61,15 +74,31 @@ def explanation(diagnosis: Diagnosis) -> str:
     return "the empirical law" if diagnosis.law else "it"
 
 
-def _or_alike(h: Hypothesis) -> str:
-    """An effect's name, and how many others the recordings cannot tell it from."""
-    others = len(h.indistinguishable_from)
-    rivals = (
-        f" or {name_of(h.indistinguishable_from[0])}"
-        if others == 1
-        else f" or one of {others} like it"
-    )
-    return name_of(h.effect) + (rivals if others else "")
+def simplest_first(diagnosis: Diagnosis, h: Hypothesis) -> list[Hypothesis]:
+    """An effect and those that the recordings cannot tell it from: of those that are as probable,
+    the one with the fewest parameters first.
+    """
+    known = {other.effect: other for other in diagnosis.hypotheses}
+    group = [h, *(known[n] for n in h.indistinguishable_from if n in known)]
+    return in_order(group)
+
+
+def _or_alike(group: Sequence[Hypothesis]) -> str:
+    return name_of(group[0].effect) + " or alike" * (len(group) > 1)
+
+
+def _equals(of: Sequence[Sequence[Hypothesis]]) -> Markup | None:
+    """What is accepted, a line each, with all that it cannot be told from; None where nothing is
+    alike.
+    """
+    if not any(len(group) > 1 for group in of):
+        return None
+    return tag("ul", (tag("li", _line(group)) for group in of), class_="equals")
+
+
+def _line(group: Sequence[Hypothesis]) -> str:
+    names = either([f"{name_of(h.effect)} ({percent(h.probability)})" for h in group])
+    return held(names) + ": not told apart by these recordings" * (len(group) > 1)
 
 
 def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
@@ -78,6 +107,16 @@ def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
     return min(
         sum(other.probability for other in diagnosis.hypotheses if other.effect in group), 1.0
     )
+
+
+def _accepted(diagnosis: Diagnosis, h: Hypothesis) -> tuple[str, str, str]:
+    """An effect, or a group that is not told apart, with its probability, and how strong it is."""
+    parameters = "; ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items())
+    group = simplest_first(diagnosis, h)
+    if len(group) == 1:
+        return name_of(h.effect), f"{percent(h.probability)} probable", parameters
+    together = f"{percent(_together(diagnosis, h))} probable"
+    return _or_alike(group), together, f"{name_of(h.effect)}: {parameters}"
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:
@@ -91,24 +130,21 @@ def _figure(term: str, value: str, detail: str) -> Markup:
 
 def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
     """The few numbers a hurried reader takes away: what, how much, beside what."""
-    test = diagnosis.test
-    alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
-    yield "evidence of a mismatch", nats(test.statistic), alarm
-
-    for h in diagnosis.accepted:
-        parameters = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
-        if h.indistinguishable_from:
-            parameters.append(f"together with its like {percent(_together(diagnosis, h))}")
-        yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(parameters)
-
     channel = _most_improved(diagnosis)
     if channel:
         fell, floor = change(diagnosis, channel)
-        yield f"{name_of(channel)} error, held out", fell, f"noise {floor}"
+        yield f"{name_of(channel)} error on unseen runs", fell, f"noise {floor}"
+
+    for h in diagnosis.accepted:
+        yield _accepted(diagnosis, h)
 
     for key in ("c", "tan_phi"):
         if diagnosis.soil is not None and key in diagnosis.soil.after:
             yield name_of(key), quantity(diagnosis.soil.after[key]), _without(diagnosis.soil, key)
+
+    test = diagnosis.test
+    alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
+    yield "evidence of a mismatch", nats(test.statistic), alarm
 
 
 def _without(soil: SoilFit, key: str) -> str:

@@ -15,6 +15,7 @@ from gritd.tools.report.words import counted, held, name_of, nats
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
 TIE = 2  # decimals of a probability: effects that differ by less are as probable
+EQUAL = 0.5  # of the largest probability: so much of it is as probable, in a group
 
 
 def introduction(diagnosis: Diagnosis) -> str:
@@ -53,14 +54,26 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         groups.append([o for g in joined for o in g] + [h])
 
     order = {h.effect: _rank(h, place) for place, h in enumerate(of)}
-    for group in groups:
-        group.sort(key=lambda h: order[h.effect])
-    return sorted(groups, key=lambda g: order[g[0].effect])
+    ranked = sorted(groups, key=lambda g: min(order[h.effect] for h in g))
+    return [in_order(group) for group in ranked]
 
 
 def _rank(h: Hypothesis, place: int) -> tuple[bool, float, int, int]:
     """Accepted ones first, then the likelier; in a tie the simpler, which has fewer parameters."""
     return not h.accepted, -round(h.probability, TIE), len(h.parameters), place
+
+
+def in_order(group: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of effects that are not told apart, those that are as probable as the likeliest first, and of
+    these the one with the fewest parameters; the others by their probability.
+    """
+    least = EQUAL * max(h.probability for h in group)
+
+    def rank(h: Hypothesis) -> tuple[bool, int, float]:
+        equal = h.probability >= least
+        return not equal, len(h.parameters) * equal, -h.probability
+
+    return sorted(group, key=rank)
 
 
 def named(of: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -70,7 +83,7 @@ def named(of: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _likely(group: Sequence[Hypothesis]) -> bool:
-    return group[0].accepted or max(h.probability for h in group) >= UNLIKELY
+    return any(h.accepted for h in group) or max(h.probability for h in group) >= UNLIKELY
 
 
 def _group(group: Sequence[Hypothesis]) -> Markup:

@@ -106,8 +106,9 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
         (
             "explained",
             (
-                "Explained: Coulomb friction or current offset",
-                "its like 98 %",
+                "Explained: Coulomb friction or alike",
+                "Coulomb friction (86 %) or current offset (12 %): not told apart",
+                "98 % probable",
                 "213 nats",
                 "0.11 → 0.013 N·m",
                 "noise 0.012 N·m",
@@ -116,7 +117,7 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
         (
             "several",
             (
-                "Explained: Coulomb friction or current offset and soil patch",
+                "Explained: Coulomb friction or alike and soil patch",
                 "cohesion change",
                 "simulated with these 2 effects",
                 "5 more runs",
@@ -296,6 +297,28 @@ def test_one_error_where_nothing_was_explained() -> None:
     root = parsed(diagnosis.render(replace(cases.consistent(), fit=same)))
     heads = [[th.text for th in table.findall("thead/tr/th")] for table in root.iter("table")]
     assert ["channel", "error", "noise floor", "error ÷ floor"] in heads
+
+
+def test_the_first_number_is_a_plain_error_on_unseen_runs() -> None:
+    said = words(diagnosis.render(cases.ALL["explained"]()))
+    assert said.index("torque error on unseen runs 0.11 → 0.013 N·m") < said.index("nats")
+
+
+def test_of_equals_that_are_not_told_apart_the_simplest_is_named_first() -> None:
+    one, two = Quantity(1.0, 0.1, "N·m"), Quantity(0.1, 0.01, "-")
+    alike = ("coulomb_friction", "wheel_inertia")
+    equals = (
+        Hypothesis("stribeck_friction", 0.4, 9.0, {"a": one, "b": two}, alike, accepted=True),
+        Hypothesis("coulomb_friction", 0.3, 9.0, {"loss": one}, ("stribeck_friction",)),
+        Hypothesis("wheel_inertia", 0.1, 9.0, {"inertia": one}, ("stribeck_friction",)),
+    )
+    names = [h.effect for h in hypotheses.named(equals)]
+    assert names == ["coulomb_friction", "stribeck_friction", "wheel_inertia"]
+
+    found = replace(cases.ALL["explained"](), hypotheses=equals)
+    said = words(diagnosis.render(found))
+    assert "Explained: Coulomb friction or alike" in said
+    assert "Coulomb friction (30 %), Stribeck friction (40 %) or wheel inertia (10 %)" in said
 
 
 def test_in_a_tie_the_simpler_effect_stands_first_and_every_name_leads_to_its_formula() -> None:

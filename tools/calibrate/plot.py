@@ -1,10 +1,9 @@
-"""The lines of a calibration as a PNG: readings, line, residuals."""
+"""The line of a calibration as a figure: readings, line, residuals."""
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,37 +12,53 @@ from gritd.tools.calibrate.outcome import Outcome
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.cli.optional import require
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+HEIGHT = 3.2  # [in]
+
 
 def draw(path: Path, outcome: Outcome) -> None:
-    """Raises CommandError."""
+    """As PNG or SVG. Raises CommandError."""
     require("matplotlib", "--png")
     if not outcome.fits:
         raise CommandError("--png: this calibration has no line to draw", USAGE)
+    from matplotlib.figure import Figure
 
-    figure = import_module("matplotlib.figure").Figure(figsize=(7.0, 5.0), layout="constrained")
+    from gritd.tools.cli.drawing import COLUMN, look, save
+
     name, line = outcome.fits[0]
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    _line(above, name, line)
-    _residuals(below, line)
+    with look():
+        figure = Figure(figsize=(COLUMN, HEIGHT), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        _line(above, name, line)
+        _residuals(below, line)
 
-    try:
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise CommandError(f"{path}: {(error.strerror or 'cannot write').lower()}", USAGE) from None
+        try:
+            save(figure, path)
+        except OSError as error:
+            why = (error.strerror or "cannot write").lower()
+            raise CommandError(f"{path}: {why}", USAGE) from None
 
 
-def _line(axes: Any, name: str, line: Line) -> None:
+def _line(axes: Axes, name: str, line: Line) -> None:
+    from gritd.tools.cli.drawing import AFTER, MEASURED, WIDE
+
     raw = np.array([point.raw.value for point in line.points])
     known = [point.known.value for point in line.points]
     ends = np.array([raw.min(), raw.max()])
-    axes.plot(ends, line.scale.value * ends + line.offset.value, color="0.6", label="fitted line")
-    axes.plot(raw, known, "o", color="C0", label="known values")
+    fitted = line.scale.value * ends + line.offset.value
+    axes.plot(ends, fitted, color=MEASURED, lw=WIDE, label="fitted line")
+    axes.plot(raw, known, "o", ms=4, color=AFTER, label="known values")
     axes.set(title=name, ylabel="known value [SI]")
-    axes.legend(frameon=False)
+    axes.legend()
 
 
-def _residuals(axes: Any, line: Line) -> None:
+def _residuals(axes: Axes, line: Line) -> None:
+    """With ± σ as they are expected to be."""
+    from gritd.tools.cli.drawing import AFTER, MEASURED, WIDE
+
     raw = [point.raw.value for point in line.points]
-    axes.axhline(0.0, color="0.6")
-    axes.errorbar(raw, line.residuals, yerr=line.expected, fmt="o", color="C0", capsize=3)
+    axes.axhline(0.0, color=MEASURED, lw=WIDE)
+    axes.errorbar(raw, line.residuals, yerr=line.expected, fmt="o", ms=4, color=AFTER, capsize=2)
     axes.set(xlabel="reading [raw]", ylabel="residual")

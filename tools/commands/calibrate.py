@@ -272,7 +272,9 @@ def _add_common(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--date", type=_date, default=date.today().isoformat(), help="default: today"
     )
-    command.add_argument("--png", type=Path, metavar="OUT.png", help="draw line and residuals")
+    command.add_argument(
+        "--png", type=Path, metavar="OUT.png", help="draw line and residuals; or .svg"
+    )
 
 
 def _add_readings(command: argparse.ArgumentParser) -> None:

@@ -91,7 +91,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--report", type=Path, metavar="OUT.html", help="a page that needs nothing else"
     )
-    parser.add_argument("--png", type=Path, metavar="OUT.png", help="the same on one sheet")
+    parser.add_argument(
+        "--png", type=Path, metavar="OUT.png", help="the same on one sheet; or .svg"
+    )
 
     return parser
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import shlex
 import sys
@@ -14,7 +15,16 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, add_configuration
+from gritd.tools.cli.command import (
+    DAMAGED,
+    DONE,
+    FAILED,
+    USAGE,
+    CommandError,
+    Parser,
+    add_configuration,
+)
+from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
 from gritd.tools.commands.estimate import check_same_rig, configurations_of, settings_of
 from gritd.tools.report import campaign, lab
@@ -24,13 +34,14 @@ from gritd.tools.report.numbers import numbers
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
-    output = arguments.json or arguments.output
+    output = arguments.json or arguments.figure or arguments.output
     files.writable(output)
+    if arguments.figure:
+        require("matplotlib", "--figure")
 
     told = _campaign(arguments, ["gritd", "report", *argv])
-    text = json.dumps(numbers(told), indent=1) if arguments.json else campaign.render(told)
     try:
-        output.write_text(text, encoding="utf-8")
+        _write(told, arguments, output)
     except OSError as error:
         raise CommandError(f"{output}: {(error.strerror or '').lower()}", USAGE) from None
     print(output)
@@ -39,6 +50,19 @@ def main(argv: Sequence[str]) -> int:
     damage = [f"{r.path}: {line}" for r in read for line in r.damage]
     print("".join(f"{visible(line)}\n" for line in damage), end="", file=sys.stderr)
     return DAMAGED if damage else DONE
+
+
+def _write(told: campaign.Campaign, arguments: Namespace, output: Path) -> None:
+    """Raises OSError; CommandError where there is nothing to draw."""
+    if not arguments.figure:
+        text = json.dumps(numbers(told), indent=1) if arguments.json else campaign.render(told)
+        output.write_text(text, encoding="utf-8")
+        return
+
+    try:
+        importlib.import_module("gritd.tools.report.forces").draw(output, told)
+    except ValueError as error:
+        raise CommandError(f"{arguments.files[0]}: {error}; nothing is drawn", FAILED) from None
 
 
 def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign:
@@ -85,6 +109,12 @@ def _parser() -> Parser:
     form = parser.add_mutually_exclusive_group()
     form.add_argument(
         "--json", type=Path, metavar="OUT", help="the figures as numbers, in place of the page"
+    )
+    form.add_argument(
+        "--figure",
+        type=Path,
+        metavar="OUT.svg",
+        help="T and DP against slip at the width of a column, SVG or PNG, in place of the page",
     )
     form.add_argument(
         "-o",

@@ -8,11 +8,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS, STAGES, Effect
@@ -22,6 +19,18 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import Parser
+from gritd.tools.cli.drawing import (
+    AFTER,
+    BEFORE,
+    COLUMN,
+    LINE,
+    MEASURED,
+    WIDE,
+    Name,
+    look,
+    named,
+    save,
+)
 from gritd.tools.testbed.fingerprints import SOIL, TORQUE_CONSTANT, WHEEL, channels, typical_value
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -36,8 +45,8 @@ LABELS = {
     "load": ("load", "N", 1.0),
 }
 AXES = {
-    "constant": "slip",
-    "slip": "slip",
+    "constant": "slip [%]",
+    "slip": "slip [%]",
     "speed": "wheel speed [rad/s]",
     "load": "load [N]",
     "sinkage": "load [N], deeper to the right",
@@ -50,7 +59,12 @@ AXES = {
     "run": "pass",
     "reversal": "wheel angle since the drive turned round [rad]",
 }
-SHADES = ("#5c6672", "#e8a33d", "#c2410c")
+SHARES = (  # of the typical strength, its name, colour and width
+    (0.0, "without", MEASURED, WIDE),
+    (0.5, "half", BEFORE, LINE),
+    (1.0, "typical", AFTER, LINE),
+)
+HEIGHT = 2.7  # [in]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -77,31 +91,30 @@ def draw(effect: type[Effect], path: Path) -> None:
     channel, covariate, _ = effect.fingerprint
     label, unit, scale = LABELS[channel]
     motion, x = sweep(covariate, turns=TEETH / _order(effect))
-    curves = [scale * _seen(effect, motion, share)[channel] for share in (0.0, 0.5, 1.0)]
+    curves = [scale * _seen(effect, motion, share)[channel] for share, *_ in SHARES]
 
-    figure, (above, below) = plt.subplots(
-        2, 1, figsize=(5.4, 4.0), sharex=True, height_ratios=(2, 1)
-    )
+    with look():
+        figure = Figure(figsize=(COLUMN, HEIGHT), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        for curve, (_, _, colour, width) in zip(curves, SHARES, strict=True):
+            above.plot(x, curve, color=colour, lw=width)
+            below.plot(x, curve - curves[0], color=colour, lw=width)
 
-    for curve, shade, name in zip(
-        curves, SHADES, ("without", "half strength", "typical strength"), strict=True
-    ):
-        above.plot(x, curve, color=shade, lw=1.5, label=name)
-        below.plot(x, curve - curves[0], color=shade, lw=1.5 if name != "without" else 0.8)
-
-    above.set_ylabel(f"{label} [{unit}]")
-    below.set_ylabel(f"change [{unit}]")
-    below.set_xlabel(AXES[covariate])
-    above.legend(frameon=False, fontsize=8)
-
-    for axes in (above, below):
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.margins(x=0.0)
-
-    figure.align_ylabels()
-    figure.tight_layout()
-    figure.savefig(path, dpi=80, metadata={"Software": None})
-    plt.close(figure)
+        above.set_ylabel(f"{label} [{unit}]")
+        below.set_ylabel(f"change [{unit}]")
+        below.set_xlabel(AXES[covariate])
+        for axes in (above, below):
+            axes.margins(x=0.0)
+        right = int(np.argmax(x))
+        named(
+            above,
+            [
+                Name(float(curve[right]), words, colour)
+                for curve, (_, words, colour, _) in zip(curves, SHARES, strict=True)
+            ],
+        )
+        figure.align_ylabels()
+        save(figure, path)
 
 
 def _seen(effect: type[Effect], motion: Motion, share: float) -> dict[str, Array]:
@@ -144,7 +157,7 @@ def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
 
     if covariate in ("slip", "constant"):
         slip = 0.02 + 0.78 * ramp
-        x = slip
+        x = 100.0 * slip
     elif covariate == "speed":
         speed = 0.02 + 0.6 * ramp
         x = speed
@@ -217,8 +230,8 @@ Physics that may be at work on a testbed and that Eqs. (1)-(10) leave out. Each 
 `estimator/effects/`, shared by simulator, diagnosis and on-line filter; [adding an
 effect](adding-an-effect.md) shows how to write one.
 
-Pictures show the channel where the effect shows most, over the covariate it follows: grey without
-it, yellow at half and red at typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry
+Pictures show the channel where the effect shows most, over the covariate it follows: without it, at
+half and at typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry
 sand (c = 1 kPa, tan φ = 0.577, k = 25 mm, n = 1.1), 65 N, slip 30 % and 0.25 rad/s where they are
 not swept; load is swept up and down again.
 

@@ -98,6 +98,15 @@ def test_the_page_is_whole_and_says_what_all_runs_know(
     assert np.count_nonzero([line == str(out) for line in capsys.readouterr().out.split()]) == 1
 
 
+def test_the_forces_are_drawn_alone_as_svg_whose_words_are_words(
+    runs: list[Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "forces.svg"
+    assert cli.main(["report", *map(str, runs), "--figure", str(out)]) == 0
+    words = " ".join(ElementTree.parse(out).getroot().itertext())
+    assert all(word in words for word in ("45 N", "90 N", "T [N·m]", "DP [N]", "slip [%]"))
+
+
 def test_an_output_that_cannot_be_written_is_one_line(
     runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,34 +8,35 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gritd.tools.cli.drawing import AFTER, BEFORE, FINE, INK, look, save
 from gritd.tools.proof.real.proof import Panel
-from gritd.tools.report.figure import plain
 
-WIDE, LEAST, HIGH, DPI = 4.2, 8.4, 2.9, 80  # [in] of a panel, of a drawing at least; [1/in]
-COLOURS = ("#111111", "#c1121f", "#00798c")
+WIDE, LEAST, HIGH = 2.9, 5.8, 2.3  # [in] of a panel, of a drawing at least; its height
+COLOURS = (INK, BEFORE, AFTER)
 MARKS = ("o", "x", "+")
 
 
 def draw(path: Path, panels: Sequence[Panel]) -> None:
     """Write the panels side by side as PNG."""
-    figure = Figure(figsize=(max(WIDE * len(panels), LEAST), HIGH), dpi=DPI, layout="constrained")
-    for ax, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-        _drawn(ax, panel)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-    figure.savefig(path)
+    with look():
+        size = (max(WIDE * len(panels), LEAST), HIGH)
+        figure = Figure(figsize=size, layout="constrained")
+        across = figure.subplots(1, len(panels), squeeze=False)[0]
+        for ax, panel in zip(across, panels, strict=True):
+            _drawn(ax, panel)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        save(figure, path)
 
 
 def _drawn(ax: Axes, panel: Panel) -> None:
     x, *curves = panel.curves
     for values, label, colour, mark in zip(curves, panel.labels, COLOURS, MARKS, strict=True):
         if panel.points:
-            ax.plot(x, values, mark, color=colour, ms=6, mew=1.4, fillstyle="none", label=label)
+            ax.plot(x, values, mark, color=colour, ms=4, mew=1.0, fillstyle="none", label=label)
         else:
-            ax.plot(x, values, color=colour, lw=1.0, label=label)
+            ax.plot(x, values, color=colour, lw=FINE, label=label)
 
-    ax.set_title(panel.title, fontsize=9)
-    ax.set_xlabel(panel.x_label, fontsize=8)
-    ax.set_ylabel(panel.y_label, fontsize=8)
-    ax.tick_params(labelsize=8)
-    plain(ax)
+    ax.set_title(panel.title)
+    ax.set_xlabel(panel.x_label)
+    ax.set_ylabel(panel.y_label)

@@ -33,6 +33,7 @@ from gritd.estimator.online.bed import (
     fingerprint,
     variances_of,
 )
+from gritd.estimator.online.sound import unsound
 from gritd.estimator.terramechanics.soil import Array
 
 FILE = "bed.json"
@@ -277,18 +278,15 @@ def _read(plain: Mapping[str, Any]) -> Bed:
 
 
 def _member(plain: Mapping[str, Any]) -> Estimate:
-    """Raises ValueError where the covariance is none."""
+    """Raises ValueError where it is no estimate."""
     x, P = _vector(plain["x"]), np.array([_vector(row) for row in plain["P"]])
     (evidence,) = _vector([plain["log_evidence"]])
-    if len(x) < STATES or P.shape != (len(x), len(x)) or not np.array_equal(P, P.T):
+    if P.shape != (len(x), len(x)):
         raise ValueError("not an estimate")
-
-    # a covariance, to rounding; a parameter that is exact has a variance of zero
-    scale = np.sqrt(np.maximum(np.diag(P), 0.0))
-    unit = P / np.outer(scale + (scale == 0.0), scale + (scale == 0.0))
-    if np.any(np.diag(P) < 0.0) or float(np.linalg.eigvalsh(unit)[0]) < -1e-9:
-        raise ValueError("not a covariance")
-    return made(x, P, evidence)
+    member = made(x, P, evidence)
+    if wrong := unsound(member):
+        raise ValueError(wrong)
+    return member
 
 
 def _vector(values: Any) -> Vector:

@@ -19,7 +19,9 @@ from types import UnionType
 from typing import Any
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.online.pipeline import State
+from gritd.estimator.online.sound import unsound
 from gritd.estimator.wheel.sync import Sync
 from gritd.estimator.wheel.windows import Counters, MeanWindow, Sample, SlopeWindow
 
@@ -101,6 +103,8 @@ def _build(kind: Any, values: list[Any]) -> Any:
         return kind(*values)
     names = _field_names(kind)
     _check(kind, names, values)
+    if kind is Estimate and (wrong := unsound(Estimate(*values))):
+        raise ValueError(f"an estimate that is {wrong}")
     if not hasattr(kind, _FIELDS):
         return kind(*values)
     return kind(**dict(zip(names, values, strict=True)))

@@ -1,8 +1,4 @@
-"""Where many independent pieces of work are done: local processes, or a dask cluster.
-
-dask exchanges pickles: whoever answers as its scheduler or its worker can run anything here. So the
-cluster must prove who it is (tls://), unless the user trusts everybody on the network.
-"""
+"""Where many independent pieces of work are done: local processes, or a dask cluster."""
 
 from __future__ import annotations
 
@@ -12,15 +8,17 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context
-from typing import Any
 
+from gritd.tools.cli.cluster import TLS, cluster
 from gritd.tools.cli.command import FAILED, USAGE, CommandError
 from gritd.tools.cli.offspring import bind_to
-from gritd.tools.cli.optional import require
 
-TLS = "tls://"
+WORKER_ENDED = (
+    "a worker process was killed, perhaps for want of memory: expected room for all of --jobs"
+)
 
 
 def add_cluster(parser: ArgumentParser, condition: str = "") -> None:
@@ -63,8 +61,8 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
         with _processes(jobs) as pool:
             yield pool, jobs
         return
-    with _cluster(scheduler) as client:
-        yield client.get_executor(pure=False), max(len(client.nthreads()), 1)
+    with cluster(scheduler) as (executor, width):
+        yield executor, width
 
 
 @contextmanager
@@ -80,6 +78,8 @@ def _processes(jobs: int) -> Iterator[Executor]:
         ) as pool:
             try:
                 yield pool
+            except BrokenProcessPool:
+                raise CommandError(WORKER_ENDED, FAILED) from None
             except BaseException:
                 for pid in (worker.pid for worker in active_children() if worker.pid):
                     with suppress(ProcessLookupError):
@@ -92,27 +92,3 @@ def _processes(jobs: int) -> Iterator[Executor]:
 def _begin(parent: int) -> None:
     os.setpgid(0, 0)
     bind_to(parent)
-
-
-@contextmanager
-def _cluster(address: str) -> Iterator[Any]:
-    require("distributed", "--scheduler")
-    from distributed import Client
-    from distributed.security import Security
-
-    security = Security(require_encryption=True) if address.startswith(TLS) else None
-    if security and security.get_connection_args("client")["ssl_context"] is None:
-        expected = "distributed.comm.tls in dask's configuration"
-        raise CommandError(
-            f"--scheduler {address}: found no certificates; expected {expected}", USAGE
-        )
-    try:
-        client: Any = Client(address, timeout="5s", security=security)
-    except (OSError, ValueError, TimeoutError):
-        raise CommandError(
-            f"--scheduler {address}: found no scheduler; expected one that answers", FAILED
-        ) from None
-    try:
-        yield client
-    finally:
-        client.close()

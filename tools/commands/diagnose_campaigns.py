@@ -9,10 +9,11 @@ is not diagnosed again.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
+from gritd.tools.cli.cluster import killed_workers
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.workers import workers
@@ -94,4 +95,14 @@ def diagnosed(
         futures = {executor.submit(work, campaign): campaign for campaign in left}
         for future in as_completed(futures):
             progress.advance()
-            yield futures[future], future.result()
+            yield futures[future], _said(future)
+
+
+def _said(future: Future[str]) -> str:
+    """What was said of a campaign. One that its workers do not survive spoils no other."""
+    try:
+        return future.result()
+    except Exception as error:
+        if not killed_workers(error):
+            raise
+        return "not diagnosed: the workers that had it ended, perhaps for want of memory"

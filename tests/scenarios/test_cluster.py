@@ -19,7 +19,7 @@ import pytest
 from gritd.config import packaged
 from tests.scenarios.hostile import honest
 from tests.scenarios.rig import ROOT, until
-from tests.tools.commands.test_diagnose_campaigns import certificates
+from tests.tools.commands.certificates import certificates
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed")
 pytestmark = [
@@ -50,7 +50,7 @@ class Cluster:
             "dask_scheduler", "--host", "tls://127.0.0.1", "--port", "0",
             "--no-dashboard", "--scheduler-file", at,
         )  # fmt: skip
-        until(at.exists)
+        until(lambda: at.exists() and at.read_text().endswith("}"))
         self.address = json.loads(at.read_text())["address"]
 
     def worker(self, name, *options):

@@ -10,6 +10,7 @@ from math import inf, nan
 from typing import NoReturn
 
 from gritd.estimator.config.names import EXPECTED, is_file_name
+from gritd.estimator.visible import brief
 
 DONE, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -26,7 +27,7 @@ class Parser(argparse.ArgumentParser):
     """argparse whose usage error is one line, `gritd: …`, and exit code 2."""
 
     def error(self, message: str) -> NoReturn:
-        print(f"gritd: {message} (see {self.prog} --help)", file=sys.stderr)
+        print(f"gritd: {brief(message)} (see {self.prog} --help)", file=sys.stderr)
         sys.exit(USAGE)
 
 

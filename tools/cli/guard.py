@@ -10,6 +10,7 @@ from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.limits import LimitsError
 from gritd.estimator.plugins import PluginError, blamed, in_words
+from gritd.estimator.visible import brief
 from gritd.tools.cli import memory
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, INTERRUPTED, USAGE, CommandError
 
@@ -52,7 +53,7 @@ def _fail(error: Exception) -> int:
     """One line for the user, and the exit code."""
     if os.environ.get("GRITD_TRACEBACK"):
         raise error
-    print(f"gritd: {_one_line(error)}", file=sys.stderr)
+    print(f"gritd: {brief(_one_line(error))}", file=sys.stderr)
     if isinstance(error, CommandError):
         return error.code
     if memory.line(error):

@@ -106,12 +106,15 @@ def _course(first: Recording, last: Recording) -> dict[str, Any]:
     row = {name: ended[name][-1] for name in ("status", "flags", *SOIL)}
     believed = "" if not int(row["flags"]) & Flag.PRIOR else " PRIOR"
     soil = {name: float(row[name]) for name in SOIL}
-    return {**course, **soil, "status": Status(int(row["status"])).name + believed}
+    number = int(row["status"])
+    status = Status(number).name if number in tuple(Status) else f"status {number}"
+    return {**course, **soil, "status": status + believed}
 
 
 def _rows(of: Recording, topic: str) -> Rows | None:
     """What was found of a topic; None where that is nothing."""
-    return of.tables({topic: TABLES[topic]})[topic] if of.counts[topic] else None
+    rows = of.tables({topic: TABLES[topic]})[topic] if of.counts[topic] else None
+    return rows if rows is not None and rows.size else None
 
 
 def chosen(entries: Sequence[RunEntry], wanted: Mapping[str, Any]) -> Iterator[RunEntry]:

@@ -3,7 +3,6 @@ to the others.
 """
 
 import os
-import subprocess
 from argparse import Namespace
 from pathlib import Path
 from shutil import which
@@ -14,6 +13,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import diagnose
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_campaigns import Campaign
+from tests.tools.commands.certificates import certificates
 
 
 def folder_of(place: Path, name: str, configurations: int = 1) -> Path:
@@ -122,17 +122,3 @@ def test_the_same_on_a_cluster_that_proves_who_it_is(tmp_path: Path) -> None:
 
     assert address.startswith("tls://127.0.0.1:")
     assert said["a"] == said["c"] == "consistent" and said["bad"].startswith("not diagnosed")
-
-
-def certificates(folder: Path) -> dict[str, str]:
-    """dask's configuration with a certificate for everybody, made here."""
-    cert, key = str(folder / "cert.pem"), str(folder / "key.pem")
-    made = ["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
-    to = ["-days", "2", "-subj", "/CN=testbed", "-keyout", key, "-out", cert]
-    subprocess.run(["openssl", *made, *to], check=True, capture_output=True)
-    roles = ("scheduler", "worker", "client")
-    return {
-        "distributed.comm.tls.ca-file": cert,
-        **{f"distributed.comm.tls.{role}.cert": cert for role in roles},
-        **{f"distributed.comm.tls.{role}.key": key for role in roles},
-    }

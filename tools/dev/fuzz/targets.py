@@ -15,6 +15,7 @@ from gritd.drivers.framing_cobs import CobsFraming
 from gritd.drivers.framing_cobs import encode as encode_cobs
 from gritd.tools.cli.progress import Progress
 from gritd.tools.dev.fuzz.case import Case
+from gritd.tools.dev.fuzz.commands import file_arguments, text_arguments
 from gritd.tools.dev.fuzz.files import configurations, recordings, truncations
 from gritd.tools.dev.fuzz.readings import wild_inputs
 from gritd.tools.dev.fuzz.wire import can_messages, databases, serial_stream
@@ -67,4 +68,6 @@ TARGETS = (
     Target("recordings mutated", 100_000, recordings),
     Target("recordings cut at every byte", 4_000, truncations),
     Target("filter, wild inputs", 100_000, wild_inputs),
+    Target("file arguments of the commands", 5_000, file_arguments),
+    Target("text arguments of the commands", 5_000, text_arguments),
 )

@@ -263,6 +263,8 @@ def _values(
     soil = _soil(path, soils, constant["soil_simulant"])
     radius = finite_number(path, "wheel_radius_m", constant["wheel_radius_m"])
     shear = finite_number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
+    if radius <= 0.0:
+        raise RigFileError(f"{path}: wheel_radius_m: found {radius:g}; expected more than 0 m")
     sigma = errors(table, args)
 
     values: dict[str, float] = {

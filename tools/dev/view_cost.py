@@ -207,6 +207,8 @@ def _memory(pid: int) -> float:
 def _tell(stretches: Sequence[Stretch], recording: Recording) -> None:
     loop = recording.arrays("/loop")
     print(f"load average {os.getloadavg()[1]:.1f} on {os.cpu_count()} cores; {recording.path.name}")
+    lost = loop[["dropped", "log_dropped"]][-1].tolist()
+    print(f"readings that the queue dropped: {lost[0]}; messages that the log dropped: {lost[1]}\n")
     print("| | daemon | view | its memory | loop late by (half, 99 %, 99.9 %) | ticks missed |")
     print("|---|--:|--:|--:|---|--:|")
     for each in stretches:

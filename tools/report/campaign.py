@@ -28,6 +28,7 @@ SOIL = {  # field -> label, factor
 }
 HEIGHT, TOP, BOTTOM = 220.0, 22.0, 182.0  # [px] of a picture and its axes
 CURVE = 40  # points of a curve over slip
+BAND = 2.0  # [σ] half width of a band
 ELLIPSES = 5  # of one run, over its time
 PANELS = 18  # of a figure in view: a printed page
 KEY = {"recorded": "recorded", "before": "original, Eqs. 1–10", "after": "closed form, Eqs. 20–22"}
@@ -207,9 +208,9 @@ def mean_over(x: Array, y: Array) -> tuple[Array, Array]:
 
 def _estimates(campaign: Campaign) -> Markup:
     note = (
-        "Each run begins with what the runs before it know. The band is ± 1σ."
+        "Each run begins with what the runs before it know. The band is ± 2σ."
         if len(campaign.runs) > 1
-        else "The band is ± 1σ."
+        else "The band is ± 2σ."
     )
 
     panels = (
@@ -229,14 +230,14 @@ def _over_time(campaign: Campaign, name: str, label: str, factor: float) -> Mark
     sigma = np.concatenate([run.rows[f"{name}_sigma"] for run in campaign.runs]) * factor
     time, begins = _time(campaign)
 
-    at = plot.axes(plot.limits(time), plot.limits(value - sigma, value + sigma), TOP, BOTTOM)
-    edges = [plot.line(at, time, value + sign * sigma, "line thin prior") for sign in (-1, 1)]
+    low, high = value - BAND * sigma, value + BAND * sigma
+    at = plot.axes(plot.limits(time), plot.limits(low, high), TOP, BOTTOM)
     return plot.picture(
         HEIGHT,
         f"{label} over time",
         plot.frame(at, label, below="time [s]"),
         plot.uprights(at, begins[1:], "change"),
-        *edges,
+        plot.ribbon(at, time, low, high, "ribbon after"),
         plot.line(at, time, value, "line after"),
     )
 
@@ -254,7 +255,7 @@ def _time(campaign: Campaign) -> tuple[Array, list[float]]:
 
 
 def _ellipses(campaign: Campaign) -> Markup:
-    """1σ ellipses of c and tan φ: some of each run, and the last."""
+    """2σ ellipses of c and tan φ: some of each run, and the last."""
     chosen = [
         _outline(row)
         for run in campaign.runs
@@ -275,11 +276,11 @@ def _ellipses(campaign: Campaign) -> Markup:
         "ellipses of c and tan φ",
         plot.frame(at, "tan φ", below="c [Pa]"),
         *drawn,
-        plot.line(at, *last, "line after"),
+        plot.line(at, *last, "line ribbon after"),
     )
 
     key = figures.legend({"prior": "on the way", "after": "at the end"})
-    caption = "What is known of c and tan φ together: ellipses of 1σ over the time of all runs."
+    caption = "What is known of c and tan φ together: ellipses of 2σ over the time of all runs."
     panel = figures.panels([figures.panel("c and tan φ", picture)])
     return section(
         "Cohesion and friction together", figures.figure(caption, panel, legend=key, small=True)
@@ -287,7 +288,7 @@ def _ellipses(campaign: Campaign) -> Markup:
 
 
 def _outline(row: np.void) -> tuple[Array, Array]:
-    """The 1σ ellipse of c [Pa] and tan φ at one window."""
+    """The 2σ ellipse of c [Pa] and tan φ at one window."""
     covariance = np.array(
         [
             [row["cohesion_sigma"] ** 2, row["cov_c_tan_phi"]],
@@ -301,7 +302,7 @@ def _outline(row: np.void) -> tuple[Array, Array]:
     circle = np.vstack([np.cos(angle), np.sin(angle)])
     ring = (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle * scale[:, None]
 
-    return row["cohesion"] + ring[0], row["tan_phi"] + ring[1]
+    return row["cohesion"] + BAND * ring[0], row["tan_phi"] + BAND * ring[1]
 
 
 # --- sensors ---

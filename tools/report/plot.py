@@ -170,6 +170,24 @@ def line(at: Axes, x: Array | Sequence[float], y: Array | Sequence[float], class
     return at.clipped(tag("path", class_=class_, d="".join(pieces)))
 
 
+def ribbon(at: Axes, x: Array, low: Array, high: Array, class_: str) -> Markup:
+    """The area between two curves over x, all (n,); of many points the outermost of each stretch.
+    Where an edge is not finite there is none.
+    """
+    good = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    x, low, high = x[good], low[good], high[good]
+    if not len(x):
+        return at.clipped()
+    starts = np.arange(0, len(x), -(-len(x) // MOST))
+    edges = (np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)[::-1])
+    across = at.x(np.concatenate((x[starts], x[starts][::-1])))
+    upright = np.clip(at.y(np.concatenate(edges)), -1e4, 1e4)
+
+    points = zip(across.tolist(), upright.tolist(), strict=True)
+    path = "L".join(f"{px:.1f} {py:.1f}" for px, py in points)
+    return at.clipped(tag("path", class_=class_, d=f"M{path}Z"))
+
+
 def uprights(at: Axes, places: Sequence[float], class_: str) -> Markup:
     """A line over the whole height at each place along the horizontal axis."""
     marks = [

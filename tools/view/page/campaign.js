@@ -70,17 +70,19 @@ const grouped = loads => {
 };
 
 const estimates = (told, name, label, decimals) => {
-  const edges = told.runs.flatMap(run => ["alone", "together"].flatMap(which => {
-    const {value, sigma} = run[which][name];
+  // A run that is not believed does not set the scale: its σ may be larger than all others together.
+  const believed = told.runs.filter(run => run.counts), of = believed.length ? believed : told.runs;
+  const edges = [...of.map(run => run.alone), ...told.runs.map(run => run.together)].flatMap(soil => {
+    const {value, sigma} = soil[name];
     return [value - 2 * sigma, value + 2 * sigma];
-  }));
+  });
   const {figure, svg, Y, words} = axes([0.4, told.runs.length + 0.6], span(edges), label, "run", told.runs.map((run, i) => i + 1));
   const X = v => BOX.left + (v - 0.4) / (told.runs.length + 0.2) * (BOX.right - BOX.left);
   told.runs.forEach((run, i) => {
     for (const [which, shift, kind] of [["alone", -0.1, "alone"], ["together", 0.1, "together"]]) {
-      const {value, sigma} = run[which][name], x = X(i + 1 + shift);
-      picture(svg, "line", {class: `whisker ${kind}`, x1: x, x2: x, y1: Y(value - 2 * sigma), y2: Y(value + 2 * sigma)});
-      picture(svg, "circle", {class: `point ${kind}`, cx: x, cy: Y(value), r: 3.5});
+      const {value, sigma} = run[which][name], x = X(i + 1 + shift), inside = y => Math.min(Math.max(y, BOX.top), BOX.bottom);
+      picture(svg, "line", {class: `whisker ${kind}`, x1: x, x2: x, y1: inside(Y(value - 2 * sigma)), y2: inside(Y(value + 2 * sigma))});
+      if (inside(Y(value)) === Y(value)) picture(svg, "circle", {class: `point ${kind}`, cx: x, cy: Y(value), r: 3.5});
     }
   });
   words("alone", BOX.right - 150, BOX.top - 10, "");

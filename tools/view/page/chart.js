@@ -69,7 +69,8 @@ export class Chart {
       ],
       cursor: {sync: {key: "time"}, drag: {x: true, y: false, setScale: false}, points: {size: 6}},
       hooks: {
-        draw: [u => this.marked(u)],
+        drawAxes: [u => this.inside(u, line => this.marked(u, line))],
+        draw: [u => this.inside(u, line => this.control.drawn(u, line))],
         setSelect: [u => this.zoomed(u)],
         setCursor: [() => this.told()],
       },
@@ -84,15 +85,20 @@ export class Chart {
     this.control.zoom(span);
   }
 
-  // The stated prior as a dashed line, and events as lines from top to bottom.
-  marked(u) {
-    const {ctx, bbox} = u, scale = devicePixelRatio;
+  // What is drawn with lines inside the axes.
+  inside(u, drawing) {
+    const {ctx, bbox} = u;
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    const line = (x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); };
+    drawing((x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); });
+    ctx.restore();
+  }
 
+  // Below the curves: the stated prior as a dashed line, and events as lines from top to bottom.
+  marked(u, line) {
+    const {ctx, bbox} = u, scale = devicePixelRatio;
     const prior = this.of.expected ?? this.control.prior(this.of);
     if (prior !== null) {
       ctx.setLineDash([5 * scale, 4 * scale]);
@@ -110,8 +116,6 @@ export class Chart {
       const x = u.valToPos(event.time, "x", true);
       line(x, bbox.top, x, bbox.top + bbox.height);
     }
-    this.control.drawn(u, this.of, line);
-    ctx.restore();
   }
 
   draw(curves) {

@@ -28,7 +28,7 @@ const control = {
   prior: chart => (chart.prior && active().prior ? active().prior[chart.prior][0] * chart.factor : null),
   chosen: place => moved(place),
   index: time => { const at = time.findIndex(t => t > page.at); return at < 0 ? time.length - 1 : Math.max(at - 1, 0); },
-  drawn: (u, chart, line) => {
+  drawn: (u, line) => {
     u.ctx.setLineDash([]);
     u.ctx.strokeStyle = getComputedStyle(document.body).color;
     const x = u.valToPos(page.at, "x", true);

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 
 from gritd.estimator.terramechanics.soil import Array
 
-# lightness L* of 73, 56, 34: apart in print and for the colour-blind; style.css has the same
-MEASURED, BEFORE, AFTER = "#a9b6c1", "#d9622b", "#005a69"
+# lightness L* of 73, 48, 30: apart in print and for the colour-blind; style.css has the same
+MEASURED, BEFORE, AFTER = "#a9b6c1", "#c24e1a", "#004f5c"
 PRIOR, INK, SOFT, RULE, IDLE = "#5f6d78", "#1c2329", "#52606b", "#d9dfe4", "#eef1f3"
 WIDE, LINE, FINE = 2.6, 1.2, 0.8  # [pt] measured below what is drawn into it; a curve; a residual
 SHADE = 0.18  # opacity of a band

@@ -22,10 +22,7 @@ from tests.scenarios.rig import ROOT, until
 from tests.tools.commands.certificates import certificates
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed"),
-]
+pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is missing")
 
 CLUSTER = "dask: worker killed, hung, of another version; TLS"
 LEVEL = "scheduler, workers and command as processes"
@@ -128,6 +125,7 @@ def one_line(error):
     return [line for line in error.splitlines() if line.startswith("gritd: ")]
 
 
+@pytest.mark.slow
 def test_workers_of_every_kind(tmp_path, figure):
     """One of another version and one that hangs from the start are left out and named; one is
     killed in the middle; what it had goes to the last.
@@ -154,6 +152,7 @@ def test_workers_of_every_kind(tmp_path, figure):
     figure(CLUSTER, LEVEL, "workers left out and named, of 2", len(notes))
 
 
+@pytest.mark.slow
 def test_a_worker_that_hangs_in_the_middle(tmp_path, figure):
     """It is given up by the scheduler after its time, and what it had goes to the other."""
     folder = campaigns(tmp_path / "campaigns", 3)
@@ -174,6 +173,7 @@ def test_a_worker_that_hangs_in_the_middle(tmp_path, figure):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["workers", "scheduler"])
 def test_nobody_is_left(tmp_path, ends, figure):
     """One line, and what was finished stays."""

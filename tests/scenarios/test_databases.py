@@ -13,6 +13,7 @@ from tests.scenarios.hostile import honest, watched
 IMPOSSIBLE = "DBC with impossible numbers, a pipe, a device"
 NO_DBC = "a file that is no DBC"
 CUT = "recover of a cut recording"
+WRITABLE = "DBC that others may write"
 OWN = "the commands as processes"
 LONGEST = 300  # characters of a line
 
@@ -85,6 +86,18 @@ def test_what_is_no_database_is_not_quoted(tmp_path, figure):
         code, said = in_process("check-config", config)
         quoted += code != 2 or "topsecret" in " ".join(said)
     figure(NO_DBC, "check-config", "quoted, or let pass", quoted, limit=0)
+
+
+def test_a_database_that_anybody_may_change(tmp_path, figure):
+    config, database = bench(tmp_path)
+    shutil.copy(packaged("testbed.dbc"), database)
+    silent = 0
+    for mode in (0o644, 0o666):
+        database.chmod(mode)
+        code, said = in_process("check-config", config)
+        warned = any("testbed.dbc: anybody may change it" in line for line in said)
+        silent += code != 0 or warned != (mode == 0o666)
+    figure(WRITABLE, "check-config", "warnings missing or without reason", silent, limit=0)
 
 
 def test_a_recording_that_is_cut(tmp_path, figure):

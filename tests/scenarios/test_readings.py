@@ -13,7 +13,7 @@ from gritd.drivers.build import build_decoder
 from gritd.drivers.can_link import packed
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.status import CHANNEL_BITS, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.topics import TICK_TOPIC
@@ -395,3 +395,38 @@ def test_duplicate_late_and_reordered_stamps(seed, figure):
     )
     counted = abs(int(other["duplicates"][-1]) - len(twice)) / len(twice)
     figure(row, PIPELINE, "duplicates not counted", counted * 100, "%", 1)
+
+
+# ---- readings without a time of their own --------------------------------------------------------
+
+TWO = "two readings in one read of the bus"
+RECEIPT = "readings stamped on receipt, 16 to 116 ms late"
+
+
+def test_two_readings_in_one_read(figure):
+    """Devices without a clock: two frames of a channel come in one piece, and both are kept."""
+    device = SETTINGS.devices["encoders"]
+    decoder, wire = build_decoder(SETTINGS, device), SerialWire(device)
+    readings = []
+    for n in range(2000):
+        pair = [wire.encode("wheel_encoder", [40 * (2 * n + k)], None) for k in range(2)]
+        readings += decoder.decode(START + (2 * n + 1) * TICK, b"".join(pair))
+    ticks = ticks_of(readings)
+    dropped = 4000 - len(readings) + ticks["duplicates"][-1] + ticks["late"][-1]
+    figure(TWO, DRIVERS, "readings dropped, of 4000", dropped, limit=0)
+
+
+@pytest.mark.parametrize("seconds", [60, pytest.param(600, marks=pytest.mark.slow)])
+def test_readings_stamped_when_they_come(seconds, figure):
+    """A bus that hands on readings late, and not evenly: the soil did not change."""
+    rng, readings = np.random.default_rng(1), []
+    for reading in shifted(driven(seconds + 4.0, 1, skip=4.0)):
+        late = round(rng.uniform(16e6, 116e6))
+        readings.append(
+            reading._replace(stamp=reading.stamp + late, received=reading.received + late)
+        )
+    readings.sort(key=lambda reading: reading.received)
+    flags = ticks_of(readings)["flags"].astype(int) & int(Flag.CHANGED)
+    begun = int(np.sum(np.diff(flags > 0, prepend=False) & (flags > 0)))
+    level = f"{PIPELINE}, {seconds} s"
+    figure(RECEIPT, level, "changes of the soil that were none", begun, limit=0)

@@ -48,9 +48,9 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     const Py_ssize_t d = r->d;
     double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
     double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS];
-    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 4 ||
+    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 ||
         !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
-        PyErr_SetString(PyExc_ValueError, "expected a line of y, H, R and D");
+        PyErr_SetString(PyExc_ValueError, "expected a line of y, H, R, D and shares");
         return 0;
     }
     const Py_ssize_t m = PyTuple_GET_SIZE(PyTuple_GET_ITEM(line, 0));

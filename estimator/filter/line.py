@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate, Matrix, Update, Vector, dot
 from gritd.estimator.filter.measurement import Measurement
-from gritd.estimator.filter.tuning import CHANGE
 from gritd.estimator.wheel.wheel_state import WheelState
 
 
@@ -18,6 +17,7 @@ class Line(NamedTuple):
     H: Matrix  # (m, d)
     R: Matrix  # (m, m) noise of a single window
     D: Matrix  # (m, m) of what does not average out within a stretch
+    share: Vector  # (m,) r W [N·m] and W [N]: what errors of form are shares of
 
     def innovation(self, x: Vector) -> Vector:
         """What the vector x (d,) leaves of it (m,)."""
@@ -36,12 +36,22 @@ class Line(NamedTuple):
             ]
         )
 
+    def missed(self, size: float) -> Line:
+        """With an error of this stretch alone, independent for each component, in shares of the
+        load.
+        """
+        D = [list(row) for row in self.D]
+        for at, share in enumerate(self.share):
+            D[at][at] += (size * share) ** 2
+        return self._replace(D=tuple(map(tuple, D)))
+
     def mixed(self, other: Line, weight: float) -> Line:
         """The mean of two, `weight` on the other."""
         keep = 1.0 - weight
         y = tuple([keep * a + weight * b for a, b in zip(self.y, other.y, strict=True)])
-        H, R, D = (_mixed(a, b, weight) for a, b in zip(self[1:], other[1:], strict=True))
-        return Line(y, H, R, D)
+        H, R, D = (_mixed(a, b, weight) for a, b in zip(self[1:4], other[1:4], strict=True))
+        share = tuple([keep * a + weight * b for a, b in zip(self.share, other.share, strict=True)])
+        return Line(y, H, R, D, share)
 
 
 def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
@@ -51,18 +61,18 @@ def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
     update = measurement.linearise(mean, prediction, estimate)
     y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
 
-    thrust = CHANGE.model_error * prediction.torque.value
-    misses = (thrust, thrust / measurement.chain.wheel.radius)
     # what lags is not off by its slip alone: torque and pull each have their own error
     own = [
-        hypot(miss, quantity.by_slip * mean.doubts[0], quantity.by_load * mean.doubts[1])
-        for miss, quantity in zip(misses, prediction, strict=False)
+        hypot(quantity.by_slip * mean.doubts[0], quantity.by_load * mean.doubts[1])
+        for quantity in prediction[:2]
     ]
     narrowing = mean.odometry.narrowing if mean.odometry else 1.0
     shared = [quantity.by_slip * mean.grain * narrowing for quantity in prediction[:2]]
     kept = measurement.kept(mean)
     lasting = _lasting([own[at] for at in kept], [shared[at] for at in kept])
-    return Line(y, update.H, update.R, lasting)
+    load = mean.load.value
+    shares = (measurement.chain.wheel.radius * load, load)
+    return Line(y, update.H, update.R, lasting, tuple([shares[at] for at in kept]))
 
 
 def _lasting(own: list[float], shared: list[float]) -> Matrix:

@@ -21,6 +21,7 @@ from gritd.estimator.filter.estimate import (
 from gritd.estimator.filter.line import Line, line_of
 from gritd.estimator.filter.measurement import Measurement, selected
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
+from gritd.estimator.filter.tuning import FORM
 
 
 class Smoother:
@@ -76,8 +77,10 @@ class Smoother:
         if not complete:
             return None
         first = memory.stretches[memory.since]
-        before = (memory.anchor if first.changed is None else first.changed)[leading(bank)]
-        lines = [stretch.line for stretch in complete if stretch.line is not None]
+        member = leading(bank)
+        before = (memory.anchor if first.changed is None else first.changed)[member]
+        own = FORM.own[member]
+        lines = [stretch.line.missed(own) for stretch in complete if stretch.line is not None]
         windows = [stretch.windows for stretch in complete]
         return judge(before, self._doubted(doubt), lines, windows)
 
@@ -109,9 +112,10 @@ class Smoother:
 
         line = stretch.line
         assert line is not None
-        noise, after = line.noise(stretch.windows), []
-        for member in bank:
-            update = Update(line.innovation(member.x), line.H, noise)
+        noises = {size: line.missed(size).noise(stretch.windows) for size in set(FORM.own)}
+        after = []
+        for member, size in zip(bank, FORM.own, strict=True):
+            update = Update(line.innovation(member.x), line.H, noises[size])
             after.append(self._engine.update(member, selected(update, stretch.components)))
         return stretch, tuple(after)
 

@@ -17,10 +17,6 @@ class ChangeTuning:
     # second (Ville), 10 h; the inequality is exact for the noise that is stated.
     alarm: float = 11.2
 
-    # Share of the torque by which the closed forms, shifted to the true stresses, may be off in a
-    # stretch, with what sensors and calibrations add meanwhile. Judgement.
-    model_error: float = 0.001
-
     # [prior σ/√s] random walk of the soil right after a change: a ramp goes on changing. Learnt
     # from ramps of 20 s.
     walk: float = 0.1
@@ -101,6 +97,13 @@ class FormTuning:
 
     # So many of them, the smallest, are no miss of the equations.
     holding: int = 2
+
+    @property
+    def own(self) -> tuple[float, ...]:
+        """For each size the error that a stretch has of its own, beside the smooth one: as large,
+        and no larger than what sensors and their filters do.
+        """
+        return tuple([min(size, self.sizes[self.holding - 1]) for size in self.sizes])
 
     # Their probabilities before the run. Judgement: half of the rigs obey their equations.
     odds: tuple[float, ...] = (0.25, 0.25, 0.25, 0.25)

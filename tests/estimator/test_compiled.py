@@ -152,7 +152,7 @@ def test_the_evidence_of_a_change_is_that_of_python_to_the_bit(components, besid
 
 def _line(rng, components, size):
     _, (y, H, R) = _drawn(rng, components, size)
-    return Line(y, H, R, rows(_spread(rng, components)))
+    return Line(y, H, R, rows(_spread(rng, components)), (0.1, 1.0)[:components])
 
 
 def test_ticks_are_those_of_python_to_the_bit(monkeypatch):

@@ -32,7 +32,7 @@ def drawn_lines(rng, change=None, at=4, offset=None, components=2):
         y = H @ x + np.eye(2) @ wrong + noise
         kept = slice(components)
         arrays = (np.hstack((H, np.eye(2)))[kept], R[kept, kept], D[kept, kept])
-        lines.append(Line(tuple(y[kept].tolist()), *map(rows, arrays)))
+        lines.append(Line(tuple(y[kept].tolist()), *map(rows, arrays), (0.1, 1.0)[kept]))
     return lines
 
 

@@ -54,7 +54,9 @@ def evidence(
 
 def _whitened(lines: Sequence[Line], windows: Sequence[int]) -> tuple[Array, Array]:
     """H (s, 2, d) and y (s, 2) of unit noise; zeros for a component that is not measured."""
-    y, H, R, D = (np.array(column) for column in zip(*[_full(line)[:4] for line in lines], strict=True))
+    y, H, R, D = (
+        np.array(column) for column in zip(*[_full(line)[:4] for line in lines], strict=True)
+    )
     noise = R / np.array(windows, float)[:, None, None] + D
     columns = np.concatenate((H, y[:, :, None]), axis=2)
 
@@ -74,7 +76,9 @@ def _full(line: Line) -> Line:
 
     (h,), ((r,),), ((d,),), (share,) = line.H, line.R, line.D, line.share
     nothing = (0.0,) * len(h)
-    return Line((*line.y, 0.0), (h, nothing), ((r, 0.0), (0.0, r)), ((d, 0.0), (0.0, d)), (share, share))
+    return Line(
+        (*line.y, 0.0), (h, nothing), ((r, 0.0), (0.0, r)), ((d, 0.0), (0.0, d)), (share, share)
+    )
 
 
 def _root(before: Estimate) -> Rows:

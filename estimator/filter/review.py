@@ -15,7 +15,7 @@ from gritd.estimator.filter.bank import Bank, misfit, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
-from gritd.estimator.filter.segments import LONGEST, Memory, Stretch
+from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.smoother import Smoother
 from gritd.estimator.filter.track import (
     Again,
@@ -30,6 +30,7 @@ from gritd.estimator.filter.track import (
 # prior standard deviations of the soil, or of the shape of the stresses, after which the memory is
 # linearised anew
 MOVED = 0.05
+UNCHECKED = 40  # windows of one condition in which the tangents are not looked at
 ROUNDS = 8  # of linearising a record at its end, at most
 
 # What a tick does. A memory of 36 stretches is judged, linearised and passed in 14 of the 24 ticks
@@ -51,7 +52,7 @@ class Reviewer:
         """A stretch has ended; like: the next is of the same condition; unlinearised: windows since
         the memory was linearised.
         """
-        return Ended(like and unlinearised < LONGEST)
+        return Ended(like and unlinearised < UNCHECKED)
 
     def anew(self, x: Vector) -> Task:
         """The record is to be passed once more, from another anchor."""

@@ -7,8 +7,10 @@ windows point along a valley that later turns out to lie elsewhere, and the filt
 certainty it gained from them: c then comes out several σ wrong. So the windows are kept, merged as
 long as the condition stays the same, and the filter is run again from its anchor over all of them
 with Jacobians at the present estimate. This is the iterated extended Kalman smoother (Bell 1994,
-SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory: the oldest
-stretch is absorbed into the anchor when there are more than CAPACITY.
+SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory. What has left
+it keeps the tangents that it had, so as little as may be leaves it: where there are more than
+CAPACITY stretches, the oldest neighbours of one condition are joined, and only where there are none
+is the oldest stretch absorbed into the anchor.
 
 A stretch is short while it is recent, so that the instant of a change is known to half a second,
 and is joined to its neighbour of the same condition as it ages.
@@ -32,7 +34,7 @@ from gritd.estimator.wheel.wheel_state import WheelState, slip_over
 
 CAPACITY = 36  # stretches that are linearised anew
 SHORTEST = 5  # windows merged into one stretch while it is recent …
-LONGEST = 40  # … and at most
+LONGEST = 160  # … and at most
 AGEING = 4  # a stretch may hold a quarter of the windows that came after it
 STEADY = 3  # windows that make a stretch one of steady motion
 SAME_SLIP = 0.02
@@ -214,6 +216,16 @@ class Memory(NamedTuple):
         since[0] = since[0]._replace(changed=known)
         return self._replace(stretches=(*self.stretches[:at], *since))
 
+    def crowded(self, radius: float) -> Memory:
+        """The memory with the oldest two neighbours joined that are of one condition; the same
+        where there are none.
+        """
+        for at in range(1, len(self.stretches) - 1):
+            left, right = self.stretches[at - 1], self.stretches[at]
+            if left.windows + right.windows <= LONGEST and _alike(left, right):
+                return self._with_joined(at, radius)
+        return self
+
     def aged(self, radius: float) -> Memory:
         """The memory with the latest two neighbours joined that are of one condition and old
         enough.
@@ -223,12 +235,16 @@ class Memory(NamedTuple):
             left, right = stretches[at - 1], stretches[at]
             allowed = min(LONGEST, after // AGEING)
             if left.windows + right.windows <= allowed and _alike(left, right):
-                joined = left.joined(right, radius)
-                rest = stretches[at + 1 :]
-                return self._replace(stretches=(*stretches[: at - 1], joined, *rest))
+                return self._with_joined(at, radius)
             after += right.windows
 
         return self
+
+    def _with_joined(self, at: int, radius: float) -> Memory:
+        """With the stretch of this number joined to the one before."""
+        joined = self.stretches[at - 1].joined(self.stretches[at], radius)
+        rest = self.stretches[at + 1 :]
+        return self._replace(stretches=(*self.stretches[: at - 1], joined, *rest))
 
 
 def _alike(left: Stretch, right: Stretch) -> bool:

@@ -62,6 +62,8 @@ class Smoother:
         many.
         """
         memory = memory.aged(self._radius)
+        if len(memory.stretches) > CAPACITY:
+            memory = memory.crowded(self._radius)
         if len(memory.stretches) <= CAPACITY:
             return memory
 

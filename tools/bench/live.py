@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import time
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.child import Child
+from gritd.tools.cli.command import FAILED, CommandError
 
 READY = 120.0  # [s] the longest that the testbed or a device may take
 SETTLED = 3.0  # [s] after the command everything has been opened and imported
@@ -50,15 +52,23 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
             Child(stop, "control", "gritd.tools.bench.control", str(rate), str(noted)) as control,
             Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "live") as daemon,
         ):
-            settled, started = 0.0, 0.0
-            while (elapsed := time.monotonic() - clock) < seconds:
+            settled, started, begun = 0.0, 0.0, inf
+            while (elapsed := time.monotonic() - clock) < min(begun, SPARE) + seconds:
                 daemon.line(0.2)
-                if not settled and elapsed > SETTLED:
+                if begun == inf and any(folder.glob("*.mcap")):
+                    begun = elapsed
+                if not settled and elapsed > max(SETTLED, begun):
                     settled, started = elapsed, _used(daemon.pid)[0]
             used, memory = _used(daemon.pid)
             daemon.stop()
             control.stop()
 
+    if begun == inf:
+        raise CommandError(
+            f"bench: the daemon recorded nothing within {SPARE + seconds:.0f} s: the machine is "
+            "too busy; repeat when it does less",
+            FAILED,
+        )
     recording = read(next(folder.glob("*.mcap")))
     loop = recording.arrays("/loop")
     return {

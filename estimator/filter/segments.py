@@ -7,8 +7,8 @@ windows point along a valley that later turns out to lie elsewhere, and the filt
 certainty it gained from them: c then comes out several σ wrong. So the windows are kept, merged as
 long as the condition stays the same, and the filter is run again from its anchor over all of them
 with Jacobians at the present estimate. This is the iterated extended Kalman smoother (Bell 1994,
-SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory. What has left
-it keeps the tangents that it had, so as little as may be leaves it: where there are more than
+SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory. What has
+left it keeps the tangents that it had, so as little as may be leaves it: where there are more than
 CAPACITY stretches, the oldest neighbours of one condition are joined, and only where there are none
 is the oldest stretch absorbed into the anchor.
 

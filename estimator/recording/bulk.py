@@ -57,14 +57,20 @@ def merged(each: Sequence[Bytes], stamps: Sequence[Stamps]) -> tuple[Bytes, Stam
     """Records (n, size) of several channels, each by rising stamps (n,), as one string of bytes in
     the order of the stamps, then of the channels; and where each record ends.
     """
-    channel = np.repeat(np.arange(len(each)), [part.shape[0] for part in each])
-    order = np.lexsort((channel, np.concatenate(stamps)))
-    sizes = np.array([part.shape[1] for part in each])[channel]
+    counts = [part.shape[0] for part in each]
+    sizes = np.repeat([part.shape[1] for part in each], counts)
+    order = np.argsort(np.concatenate(stamps), kind="stable")
 
     ends = np.cumsum(sizes[order])
     begins = np.empty_like(ends)
     begins[order] = ends - sizes[order]
     whole = np.empty(int(ends[-1]) if ends.size else 0, np.uint8)
-    for number, part in enumerate(each):
-        whole[begins[channel == number][:, None] + np.arange(part.shape[1])] = part
+    for part, begin in zip(each, np.split(begins, np.cumsum(counts)[:-1]), strict=True):
+        _places(whole, part.shape[1])[begin] = part.view(f"V{part.shape[1]}")[:, 0]
     return whole, ends
+
+
+def _places(whole: Bytes, size: int) -> NDArray[np.void]:
+    """Every place (n,) in a string of bytes at which so many may stand; they overlap."""
+    room = max(whole.size - size + 1, 0)
+    return np.ndarray((room,), np.dtype((np.void, size)), whole, strides=(1,))

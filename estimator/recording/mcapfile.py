@@ -15,7 +15,7 @@ import stat
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from io import FileIO
@@ -233,25 +233,26 @@ class McapFile:
             self._append(piece)
         self._attachment_index.append(moved)
 
-    def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
+    def add_chunk(self, messages: bytes | bytearray, starts: Starts) -> None:
         """Write message records, concatenated in `messages`, that begin at byte offsets `starts`,
         shape (n,), in this order, as one chunk. Raises RecordingError where the file cannot be
         written, and MemoryError.
         """
-        if len(starts) == 0:
+        if starts.size == 0:
             return
 
-        heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
+        heads = gather(messages, starts, MESSAGE_DTYPE)
         # np.unique would sort them
-        channels = np.flatnonzero(np.bincount(heads["channel"])).tolist()
+        each = np.bincount(heads["channel"])
+        channels = np.flatnonzero(each).tolist()
         preamble = b"".join(self._preambles[channel] for channel in channels)
         content = preamble + messages
-        offsets = np.asarray(starts, np.uint64) + np.uint64(len(preamble))
+        offsets = starts + len(preamble)
         span = int(heads["log_time"].min()), int(heads["log_time"].max())
         chunk = record_bytes(self._chunk(content, span))
         indexes = [_message_index(channel, heads, offsets) for channel in channels]
         lengths = [(channel, len(index)) for channel, index in indexes]
-        counts = self._counts + Counter(heads["channel"].tolist())
+        counts = self._counts + Counter({channel: int(each[channel]) for channel in channels})
         whole = self._span or span
         whole = min(whole[0], span[0]), max(whole[1], span[1])
 
@@ -399,14 +400,14 @@ def _created(draft: Path) -> FileIO:
     return open(draft, "xb", buffering=0)
 
 
-def _message_index(
-    channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]
-) -> tuple[int, bytes]:
+def _message_index(channel: int, heads: NDArray[np.void], offsets: Starts) -> tuple[int, bytes]:
     """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the
     channel.
     """
-    own = heads["channel"] == channel
-    entries = np.column_stack([heads["log_time"][own], offsets[own]]).astype("<u8").tobytes()
+    own = np.flatnonzero(heads["channel"] == channel)
+    pairs = np.empty((own.size, 2), "<u8")
+    pairs[:, 0], pairs[:, 1] = heads["log_time"][own], offsets[own]
+    entries = pairs.tobytes()
 
     head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
         "<HI", channel, len(entries)

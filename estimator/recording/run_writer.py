@@ -7,6 +7,7 @@ before that tick. See docs/recording.md.
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -119,7 +120,7 @@ class RunWriter:
         if self._pending.starts:
             # made before: once the chunk is written, nothing may fail
             following = _Pending()
-            self._file.add_chunk(self._pending.records, self._pending.starts)
+            self._file.add_chunk(self._pending.records, np.array(self._pending.starts, np.int64))
             self._pending = following
 
     def flush(self) -> None:
@@ -176,7 +177,7 @@ class _Pending:
 
     def __init__(self) -> None:
         self.records = bytearray()
-        self.starts: list[int] = []
+        self.starts = array("q")
 
     def add(self, record: bytes) -> None:
         """Raises MemoryError, and nothing has changed."""
@@ -190,7 +191,7 @@ class _Pending:
     def extend(self, records: bytes, starts: Stamps) -> None:
         """The same of several, which begin at `starts` (n,) in `records`."""
         before = len(self.starts)
-        self.starts += (starts + len(self.records)).tolist()
+        self.starts.frombytes((starts + len(self.records)).tobytes())
         try:
             self.records += records
         except MemoryError:

@@ -148,7 +148,7 @@ def write_two_channels(path: Path) -> None:
         body = topic.codec.encode((T0 + i, i, 0.5 * i)[: len(topic.names)])
         starts.append(len(records))
         records += MESSAGE_HEAD.pack(5, 22 + len(body), channel, 0, T0 + i, T0 + i) + body
-    file.add_chunk(records, starts)
+    file.add_chunk(records, np.array(starts))
     file.close()
 
 

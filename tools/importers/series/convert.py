@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,17 +211,21 @@ def _streams(
     for channel, name in used.items():
         column, numbers = mapped.columns[name], run.table.column(name).numbers
         known = np.isfinite(numbers)
+        stamped, values = _chosen(at, known), _chosen(numbers, known)
         if channel in quanta:
-            seconds = run.seconds[known]
-            whole = encoders.counted(seconds, numbers[known], column, quanta[channel])
-            streams.append(Stream(channel, at[known], whole))
-        else:
-            streams.append(Stream(channel, at[known], numbers[known]))
+            seconds = _chosen(run.seconds, known)
+            values = encoders.counted(seconds, values, column, quanta[channel])
+        streams.append(Stream(channel, stamped, values))
 
     if any(mapped.named(axis) for axis in AXES):
         weights = run.info.nominal_load or settings.load.nominal.value
         streams.append(_wrench(run, at, mapped, weights))
     return [stream for stream in streams if stream.stamps.size]
+
+
+def _chosen(rows: NDArray[Any], known: NDArray[np.bool_]) -> NDArray[Any]:
+    """The rows (n, …) that are marked; the same ones, not a copy, where all are."""
+    return rows if np.all(known) else rows[known]
 
 
 def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float) -> Stream:
@@ -229,13 +234,15 @@ def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: f
     columns = [run.table.column(name).numbers for name in measured.values()]
     columns = _of_one_clock(run.seconds, columns)
 
-    six = np.zeros((at.size, len(WRENCH_FIELDS)))
-    six[:, WRENCH_FIELDS.index("fz")] = weights
+    six = np.zeros((at.size, len(WRENCH_FIELDS)), order="F")  # columns of zeros take no memory
+    if "fz" not in measured:
+        six[:, WRENCH_FIELDS.index("fz")] = weights
+    known = np.ones(at.size, dtype=bool)
     for (field, name), numbers in zip(measured.items(), columns, strict=True):
         six[:, WRENCH_FIELDS.index(field)] = numbers * mapped.columns[name].per_unit
+        known &= np.isfinite(numbers)
 
-    known = np.all(np.isfinite(six), axis=1)
-    return Stream("wrench", at[known], six[known])
+    return Stream("wrench", _chosen(at, known), _chosen(six, known))
 
 
 def _of_one_clock(seconds: Array, columns: list[Array]) -> list[Array]:
@@ -243,7 +250,7 @@ def _of_one_clock(seconds: Array, columns: list[Array]) -> list[Array]:
     its neighbours where these are close. Axes of one clock stay as they are.
     """
     counts = [int(np.isfinite(column).sum()) for column in columns]
-    together = int(np.all(np.isfinite(columns), axis=0).sum())
+    together = int(np.logical_and.reduce([np.isfinite(c) for c in columns]).sum())
     if together > TOGETHER * min(counts):
         return columns
 

@@ -16,7 +16,7 @@ from gritd.tools.importers.series.cells import OddCell
 from gritd.tools.importers.series.columns import SeriesTable, Told, no_column, told_rows
 from gritd.tools.importers.series.dialect import Layout, is_value, joined, layout, split
 from gritd.tools.importers.series.mapping import Mapped
-from gritd.tools.importers.series.text_columns import Builder, Loose, Numbers, Times, Words
+from gritd.tools.importers.series.text_columns import Builder, Growing, Loose, Numbers, Times, Words
 from gritd.tools.importers.series.text_file import TextFile, text_file
 from gritd.tools.importers.series.times import TimeFormatError, is_gap
 
@@ -132,15 +132,22 @@ def _fields(line: str, separator: str) -> list[str]:
         return []
 
 
+def _begun(lines: Sequence[str], separator: str, last: int) -> Rows:
+    """The fields of lines without quotes, up to the one at `last`; of some more between blanks."""
+    if separator == " ":
+        return [line.split() for line in lines]
+    return [line.rstrip("\n").split(separator, last + 1) for line in lines]
+
+
 class _Table:
     """Rows to columns. What cannot be read is left out, and told."""
 
     def __init__(self, path: Path, form: Layout, columns: dict[tuple[str, int], Builder]) -> None:
         self._path, self._form, self._columns = path, form, columns
-        self._plain = [at for (_, at), made in columns.items() if isinstance(made, Numbers)]
+        self._plain = {at: made for (_, at), made in columns.items() if made.numeric}
         self._places = [at for _, at in columns]
         self._needed = max((at for _, at in columns), default=0) + 1
-        self._lines: list[NDArray[np.int64]] = []
+        self._lines = Growing(np.int64)
         self._left_out: dict[str, list[int]] = {}
         self.rows = 0
 
@@ -179,7 +186,7 @@ class _Table:
             self._path,
             columns,
             self._form.units,
-            np.concatenate(self._lines),
+            self._lines.whole,
             tuple(notes + why),
             left_out=self._rows_left_out(),
         )
@@ -210,7 +217,8 @@ class _Table:
         Raises ValueError where a cell is odd.
         """
         separator, width = self._form.separator, self._form.width
-        if any('"' in line or "\0" in line for line in lines):
+        text = "".join(lines)
+        if '"' in text or "\0" in text:
             return None
         if separator != " " and {line.count(separator) for line in lines} != {width - 1}:
             return None
@@ -218,7 +226,7 @@ class _Table:
         pieces = self._plain_numbers(lines)
         rest = [(at, made) for (_, at), made in self._columns.items() if at not in pieces]
         if rest:
-            rows = [split(line, separator) for line in lines]
+            rows = _begun(lines, separator, max(at for at, _ in rest))
             if separator == " " and set(map(len, rows)) != {width}:
                 return None
             pieces |= {at: made.convert([row[at] for row in rows]) for at, made in rest}
@@ -235,15 +243,18 @@ class _Table:
             values = np.loadtxt(
                 lines,
                 delimiter=separator,
-                usecols=self._plain,
+                usecols=list(self._plain),
                 comments=None,
                 ndmin=2,
                 max_rows=len(lines),
             )
         except ValueError:
             return {}
-        values[~np.isfinite(values)] = np.nan
-        return {at: values[:, number].copy() for number, at in enumerate(self._plain)}
+        made = {
+            at: column.plain(numbers.copy())
+            for (at, column), numbers in zip(self._plain.items(), values.T, strict=True)
+        }
+        return {at: piece for at, piece in made.items() if piece is not None}
 
     # --- rows ---
 
@@ -322,7 +333,7 @@ class _Table:
                     f"{self._path}: row {row}: {name[:40]}: expected a number up to {LARGEST:g}"
                 )
             made.keep(pieces[at])
-        self._lines.append(numbers)
+        self._lines.add(numbers)
         self.rows += numbers.size
 
     # --- refusals ---
@@ -333,7 +344,7 @@ class _Table:
         """
         most, columns = limits().series, len(self._columns)
         rows = float(self.rows)
-        if len(self._lines) == 1 and not text.packed:
+        if self.rows <= len(lines) and not text.packed:  # the first block
             rows *= text.size / max(sum(map(len, lines)), 1)
         if rows * columns > most:
             raise RigFileError(

@@ -17,7 +17,7 @@ from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
 from gritd.tools.importers.series.mapping import SeriesMap
 from gritd.tools.importers.series.noise import spacing
-from gritd.tools.importers.series.sources import stem
+from gritd.tools.importers.series.sources import CLOCKS, stem
 from gritd.tools.importers.series.stamps import (
     LEAST,
     Order,
@@ -136,10 +136,12 @@ def _parts(
 
 
 def _run(table: SeriesTable, times: Nanoseconds, name: str, mapped: SeriesMap) -> SeriesRun:
-    began = int(times[0])
+    began, info = int(times[0]), info_of(table, name, mapped)
+    clocks = [mapped.named(channel) for channel in CLOCKS]
+    kept = {name: column for name, column in table.columns.items() if name not in clocks}
     return SeriesRun(
-        info_of(table, name, mapped),
-        table,
+        info,
+        replace(table, columns=kept, lines=None),
         (times - began) / NS,
         began if began > EPOCH else None,
         began=began,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config import units
-from gritd.tools.importers.files import RigFileError
+from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
 from gritd.tools.importers.series.mapping import CLOCK, Mapped, SeriesMap
 from gritd.tools.importers.series.times import (
@@ -19,6 +19,7 @@ from gritd.tools.importers.series.times import (
     Nanoseconds,
     TimeFormatError,
     clock,
+    of_floats,
     of_numbers,
     of_texts,
     per_unit,
@@ -46,6 +47,11 @@ class TimeColumn:
         if self._clock is None:
             self._clock = clock(words, self._mapped.order)
         return self._clock.read(words)
+
+    def plain(self, values: Array) -> Nanoseconds | None:
+        """[ns] of numbers (n,), as of their words; None where these may say more."""
+        instants = of_floats(values, self._unit)
+        return None if instants is None else self._counted(instants)
 
     def column(self, column: Column) -> Column:
         """A column that was read already, with its instants. Raises TimeFormatError."""

@@ -7,19 +7,49 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from gritd.tools.importers.files import Array
 from gritd.tools.importers.series.cells import last_digit, loose, numbers
 from gritd.tools.importers.series.columns import Column
-from gritd.tools.importers.series.mapping import Mapped
+from gritd.tools.importers.series.mapping import CLOCK, Mapped
 from gritd.tools.importers.series.stamps import TimeColumn
 from gritd.tools.importers.series.times import NONE, NS, Nanoseconds
 
 
+class Growing:
+    """An array (n,) that grows at its end. Of its spare room nothing is written, so it takes no
+    memory.
+    """
+
+    def __init__(self, dtype: DTypeLike) -> None:
+        self._room, self._size = np.empty(1024, dtype), 0
+
+    def add(self, piece: NDArray[Any]) -> None:
+        end = self._size + piece.size
+        if end > self._room.size:
+            room = np.empty(2 * end, self._room.dtype)
+            room[: self._size] = self.whole
+            self._room = room
+        self._room[self._size : end] = piece
+        self._size = end
+
+    @property
+    def whole(self) -> NDArray[Any]:
+        return self._room[: self._size]
+
+
 class Builder(Protocol):
-    """One column in the making. `convert` raises OddCell or TimeFormatError, and keeps nothing."""
+    """One column in the making. `convert` raises OddCell or TimeFormatError, and keeps nothing.
+
+    numeric: whether `plain` may make of numbers (n,) what `convert` makes of their words; None
+    where a number does not hold all that its word says.
+    """
+
+    numeric: bool
 
     def convert(self, cells: Sequence[str]) -> Any: ...
+    def plain(self, values: Array) -> Any: ...
     def keep(self, piece: Any) -> None: ...
     def column(self) -> Column: ...
 
@@ -29,19 +59,25 @@ class Numbers:
     whether a comma in it can only be a decimal one.
     """
 
+    numeric = True
+
     def __init__(self, first: Sequence[str], commas: bool) -> None:
         self._commas = commas
-        self._pieces: list[Array] = []
+        self._kept = Growing(np.float64)
         self._resolution = last_digit(first)
 
     def convert(self, cells: Sequence[str]) -> Array:
         return numbers(cells, self._commas)
 
+    def plain(self, values: Array) -> Array:
+        values[~np.isfinite(values)] = math.nan
+        return values
+
     def keep(self, piece: Array) -> None:
-        self._pieces.append(piece)
+        self._kept.add(piece)
 
     def column(self) -> Column:
-        return Column(joined(self._pieces), resolution=self._resolution)
+        return Column(self._kept.whole, resolution=self._resolution)
 
 
 class Times:
@@ -49,21 +85,34 @@ class Times:
 
     def __init__(self, mapped: Mapped) -> None:
         self._time = TimeColumn(mapped)
-        self._pieces: list[Nanoseconds] = []
+        self._kept = Growing(np.int64)
+        self.numeric = mapped.unit != CLOCK
 
     def convert(self, cells: Sequence[str]) -> Nanoseconds:
         return self._time.read(cells)
 
+    def plain(self, values: Array) -> Nanoseconds | None:
+        return self._time.plain(values)
+
     def keep(self, piece: Nanoseconds) -> None:
-        self._pieces.append(piece)
+        self._kept.add(piece)
 
     def column(self) -> Column:
-        instants = joined(self._pieces)
+        instants = self._kept.whole
         seconds = np.where(instants == NONE, math.nan, instants / NS)
         return Column(seconds, instants=instants, period=self._time.period)
 
 
-class Words:
+class _Worded:
+    """A column that numbers cannot tell."""
+
+    numeric = False
+
+    def plain(self, values: Array) -> None:
+        return None
+
+
+class Words(_Worded):
     """A column of words; equal ones are kept once."""
 
     def __init__(self) -> None:
@@ -80,7 +129,7 @@ class Words:
         return Column(np.full(len(self._words), math.nan), self._words)
 
 
-class Loose:
+class Loose(_Worded):
     """A column of which nothing is known: numbers; with the words, where one cell is none."""
 
     def __init__(self, first: Sequence[str]) -> None:
@@ -96,10 +145,3 @@ class Loose:
     def column(self) -> Column:
         values, odd = loose(self._cells)
         return Column(values, self._cells if odd else None, self._resolution)
-
-
-def joined(pieces: list[Any]) -> Any:
-    """Arrays (n,) end to end; the pieces are gone."""
-    whole = np.concatenate(pieces) if pieces else np.empty(0)
-    pieces.clear()
-    return whole

@@ -75,9 +75,7 @@ class TextFile:
         """The next lines, each with its end; none behind the last. Raises RigFileError."""
         lines = self._lines.readlines(BLOCK)
         for _ in range(QUOTED):
-            if sum(line.count('"') for line in lines) % 2 == 0 or not (
-                more := self._lines.readline()
-            ):
+            if "".join(lines).count('"') % 2 == 0 or not (more := self._lines.readline()):
                 break
             lines.append(more)
         return lines

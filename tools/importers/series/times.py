@@ -249,14 +249,20 @@ def of_texts(words: Sequence[str], unit: int) -> Nanoseconds:
     """
     try:
         values = np.array(list(map(float, words)))
-        largest = float(np.max(np.abs(values), initial=0.0)) * unit
-        if largest < EXACT:
-            return np.round(values * unit).astype(np.int64)
-        if largest < 0.999 * LATEST:
+        if (made := of_floats(values, unit)) is not None:
+            return made
+        if np.max(np.abs(values)) * unit < 0.999 * LATEST:
             return np.array(list(map(int, words)), dtype=np.int64) * unit
     except ValueError:  # a gap, a decimal comma, a fraction with many digits
         pass
     return np.array([_exact(word, unit, at) for at, word in enumerate(words)], dtype=np.int64)
+
+
+def of_floats(values: Array, unit: int) -> Nanoseconds | None:
+    """Numbers (n,) in a unit of so many ns; None where any is none, or too large to be exact."""
+    if not np.max(np.abs(values), initial=0.0) * unit < EXACT:
+        return None
+    return np.round(values * unit).astype(np.int64)
 
 
 def _exact(word: str, unit: int, at: int) -> int:

@@ -21,7 +21,7 @@ from gritd.estimator.plugins import (
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.files import unwritten
-from gritd.tools.importers.registry import Importer, importers
+from gritd.tools.importers.registry import Importer, aliases, importers
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,7 +50,10 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="rig", metavar="RIG", required=True)
 
     for name, rig in importers().items():
-        command = commands.add_parser(name, help=rig.SUMMARY, description=rig.SUMMARY)
+        command = commands.add_parser(
+            name, aliases=aliases(rig), help=rig.SUMMARY, description=rig.SUMMARY
+        )
+        command.set_defaults(rig=name)  # by whichever name it was called
         command.add_argument(
             "paths", nargs="+", type=Path, metavar="PATH", help="files, or folders to search"
         )
@@ -58,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
             "-o",
             "--output",
             type=Path,
-            required=name != "csv",  # which may only guess
+            required=name != "series",  # which may only guess
             metavar="OUTDIR",
             help="folder to write into",
         )

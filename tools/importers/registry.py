@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
@@ -19,7 +19,9 @@ PARTS = ("NAME", "SUMMARY", "add_arguments", "run")  # of an importer
 
 
 class Importer(Protocol):
-    """A module of `rigs/`. `run` gets `paths` and `output` beside its own arguments."""
+    """A module of `rigs/`. `run` gets `paths` and `output` beside its own arguments. ALIASES, where
+    it has some, are further names.
+    """
 
     NAME: str
     SUMMARY: str
@@ -43,21 +45,27 @@ def importers() -> dict[str, Importer]:
     return own | _added(own)
 
 
+def aliases(importer: Importer) -> tuple[str, ...]:
+    """Further names of an importer."""
+    return getattr(importer, "ALIASES", ())
+
+
 def _added(own: Mapping[str, Importer]) -> dict[str, Importer]:
     """Importers of other packages: modules like those of `rigs/`; without what is none, which is
     said.
     """
     importers: dict[str, Importer] = {}
+    named = {*own, *(alias for each in own.values() for alias in aliases(each))}
     for name, importer in plugins(IMPORTERS).items():
         try:
-            _check(name, importer, own)
+            _check(name, importer, named)
             importers[name] = importer
         except PluginError as error:
             leave_out(IMPORTERS, name, error)
     return importers
 
 
-def _check(name: str, importer: object, own: Mapping[str, Importer]) -> None:
+def _check(name: str, importer: object, own: Collection[str]) -> None:
     """Raises PluginError."""
     lacking = [part for part in PARTS if not hasattr(importer, part)]
     if lacking or name != getattr(importer, "NAME", None):

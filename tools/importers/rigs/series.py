@@ -27,7 +27,8 @@ from gritd.tools.importers.series.plausible import driven_of, sources_of
 from gritd.tools.importers.series.runs import SeriesRun, check
 from gritd.tools.importers.series.sources import RunFiles, read, runs_files, series_files
 
-NAME = "csv"
+NAME = "series"
+ALIASES = ("csv",)
 SUMMARY = "time series of any rig, tables, bags and logs, by a map of columns to channels"
 
 ENOUGH = 20_000  # rows of each table of a bag that a proposal is made from

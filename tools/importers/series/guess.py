@@ -16,7 +16,7 @@ from gritd.tools.importers.series.mapping import DATE, TIME
 from gritd.tools.importers.series.proposals import Proposal, even, of_day, proposal, shown
 
 HEAD = """\
-# A proposal of `gritd import csv --guess`: check every line, then import with --map.
+# A proposal of `gritd import series --guess`: check every line, then import with --map.
 # A line with `# ?` asks: choose. Channels: docs/importing.md. Noise is estimated where not stated.
 """
 WHEEL_LINES = """\

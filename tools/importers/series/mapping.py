@@ -1,4 +1,4 @@
-"""The map of `gritd import csv`: which column is which channel, in which unit; strict YAML with one
+"""The map of `gritd import series`: which column is which channel, in which unit; strict YAML with one
 line for a mistake.
 """
 

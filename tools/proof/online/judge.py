@@ -1,6 +1,6 @@
 """What `gritd estimate` and the filter say of a bench's tables, and how it compares with the truth.
 
-The tables go through `gritd import csv` in another process, as a user's would.
+The tables go through `gritd import series` in another process, as a user's would.
 """
 
 from __future__ import annotations

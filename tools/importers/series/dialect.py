@@ -20,6 +20,7 @@ SEPARATORS = ("\t", ";", "|", ",", " ")  # the last: any number of blanks and ta
 COMMENT = re.compile(r"\s*(?:[#%]+|//)\s*")
 LAST = 20  # rows at the end of the beginning that tell how the table is written
 SHARE = 0.6  # of these with the usual number of fields
+HALF = 0.5  # sense of the fields between tabs, where these part the rows
 GAP = 0.9  # what a gap in words counts, beside a value
 CELLS = 100_000  # that are looked at for it
 FARTHEST = 500  # lines above the rows in which the names of the map are looked for
@@ -162,7 +163,9 @@ def _separator(path: Path, lines: Sequence[str], wanted: set[str]) -> tuple[str,
             f"{path}: found no table; expected rows of two fields or more, separated by commas, "
             "semicolons, tabs or blanks"
         )
-    _, separator, rows = max(found, key=lambda each: each[0])
+    tabs = any(sense > HALF for sense, separator, _ in found if separator == "\t")
+    chosen = [each for each in found if not (tabs and each[1] == " ")]  # blanks within its fields
+    _, separator, rows = max(chosen, key=lambda each: each[0])
     return separator, rows
 
 

@@ -129,10 +129,10 @@ def _lines(each: Proposal, taken: dict[str, str]) -> Iterator[str]:
 
 
 def _rival(text: str, taken: dict[str, str]) -> str:
-    """The column of a channel that excludes the one of an option's text; '' for none."""
+    """The column that has the channel of an option's text, or one that excludes it; '' for none."""
     channel = text.split(",")[0].removeprefix("channel: ")
-    group = next((group for group in GROUPS if channel in group), ())
-    return next((taken[other] for other in group if other in taken and other != channel), "")
+    group = next((group for group in GROUPS if channel in group), (channel,))
+    return next((taken[other] for other in group if other in taken), "")
 
 
 def _unused(
@@ -140,9 +140,10 @@ def _unused(
 ) -> str:
     """Why a column is left out."""
     why = "not used"
-    lacking = next((other for other in others if name not in other.columns), None)
+    having = {other.path for other in others if name in other.columns}
+    lacking = next((other.path for other in others if other.path not in having), None)
     if lacking is not None:
-        why = f"not in {lacking.path.name}"
+        why = f"not in {lacking.name}"
     elif each is not None:
         why = f"not used, another column is the {each.channel.rstrip('?')}"
     return f"  # {_quoted(name)}: {why}, {shown(table.columns[name])}"

@@ -17,6 +17,7 @@ MESSAGE = re.compile(r"\.(data|value)$")  # of a ROS message that has nothing el
 SIDE = "on which side of the drive it was measured"
 CAPITAL = {"T": "torque?", "M": "torque?", "W": "load", "N": "load", "DP": "drawbar_pull"}
 FORCE = "load"
+JOINT = {"joint", "joints"}
 AXLE, OTHER_AXES = {"ty", "my", "y"}, {"tx", "mx", "tz", "mz", "x", "z"}
 
 
@@ -51,7 +52,7 @@ def unit_of(table: SeriesTable, name: str) -> Unit | None:
         *reversed(names.IN_BRACKETS.findall(name)),
         f"{rate[1]}/s" if rate else "",
         ending[1] if ending else "",
-        name,
+        name if len(name) > 1 or name.isupper() else "",  # v is no volt
     )
     for text in texts:
         if text and (known := names.unit_of(text)) is not None:
@@ -181,10 +182,15 @@ def _unnamed(
         return Meaning("wheel_speed", 1)
     if counts:
         return Meaning("wheel_count", 0, _of_counts("wheel", counts))
+    if words & JOINT and (unit is None or fits("wheel_angle", unit)) and "position" in means:
+        return Meaning("wheel_angle", 0, "whether this joint turns the wheel")
+    if words & JOINT and speed and unit is None:
+        return Meaning("wheel_speed", 0, "whether this joint turns the wheel")
     if "angle" in means and not speed:
         return Meaning("wheel_angle", 1)
     if speed:
-        return Meaning("carriage_speed", 1)
+        whose = "whether it is the carriage's" if words <= {"v", "vx"} else ""
+        return Meaning("carriage_speed", 1, whose)
     if "position" in means or "x" in words:
         return Meaning("carriage_position", 1)
     return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.config.names import is_file_name
-from gritd.tools.importers.files import Array
+from gritd.tools.importers.files import LARGEST, Array
 from gritd.tools.importers.series.columns import Column, SeriesTable
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.mapping import CLOCK, DATE, MEASURED, TIME, Mapped
@@ -182,7 +182,7 @@ def _measured(
     name: str, columns: Sequence[Column], meaning: Meaning, unit: Unit | None
 ) -> Proposal | None:
     known = [column.numbers[np.isfinite(column.numbers)] for column in columns]
-    if not known[0].size:
+    if not known[0].size or any(np.any(np.abs(values) > LARGEST) for values in known):
         return None
     constant = all(values.size and np.ptp(values) == 0.0 for values in known)
     if constant and meaning.channel == "load":

@@ -119,8 +119,8 @@ def load(path: Path) -> PlateMap:
 
 
 def plate_log(path: Path, mapped: PlateMap, diameter: float | None = None) -> PlateLog:
-    """One log of a file of any kind that `gritd import series` reads. diameter: [m] of the plate where
-    the map states none. Raises RigFileError.
+    """One log of a file of any kind that `gritd import series` reads. diameter: [m] of the plate
+    where the map states none. Raises RigFileError.
     """
     wide = mapped.plates.get(path.name, mapped.diameter) or diameter
     if wide is None:

@@ -1,5 +1,5 @@
-"""The map of `gritd import series`: which column is which channel, in which unit; strict YAML with one
-line for a mistake.
+"""The map of `gritd import series`: which column is which channel, in which unit; strict YAML with
+one line for a mistake.
 """
 
 from __future__ import annotations

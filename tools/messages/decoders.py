@@ -29,7 +29,10 @@ def decoder(kind: str, encoding: str, schema: str, text: str, own: Mapping[str, 
     if encoding == "json":
         return json.loads
     if encoding not in ("cdr", "ros1"):
-        raise Undecodable(f"found messages in {encoding[:20] or 'no encoding'}; expected {READ}")
+        raise Undecodable(
+            f"found messages in {encoding[:20] or 'no encoding'}; expected {READ}; or the topic "
+            "saved as CSV, as PlotJuggler can"
+        )
 
     try:
         store, name = _store(kind, schema, text, own)

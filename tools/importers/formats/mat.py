@@ -23,7 +23,10 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
     """
     vectors = _vectors("", _content(path))
     if not vectors:
-        raise RigFileError(f"{path}: found no vector; expected columns of time series")
+        raise RigFileError(
+            f"{path}: found no vector; expected columns of time series; of a table or timetable "
+            "save table2struct(T, 'ToScalar', true)"
+        )
     return by_length(path, vectors)
 
 

@@ -36,5 +36,6 @@ def _loaded(path: Path, content: Any, wanted: Wanted) -> dict[str, Any]:
     arrays = {}
     for name in filter(wanted.touches, content.files):
         with suppress(ValueError):
-            arrays[name] = content[name]
+            if isinstance(values := content[name], np.ndarray):  # not of what else is in a zip
+                arrays[name] = values
     return arrays

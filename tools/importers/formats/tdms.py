@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.formats.made import check_size, reading, since, table
 from gritd.tools.importers.series.columns import SeriesTable, Wanted
 from gritd.tools.importers.series.times import Nanoseconds
@@ -22,7 +23,11 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
         for channel in (channel for group in file.groups() for channel in group.channels()):
             if len(channel):
                 alike.setdefault(_clock_of(channel), []).append(channel)
-        return [_table(path, channels, wanted) for channels in alike.values()]
+        tables = [_table(path, channels, wanted) for channels in alike.values()]
+
+    if not tables:
+        raise RigFileError(f"{path}: found no values; expected channels of a TDMS file")
+    return tables
 
 
 def _clock_of(channel: Any) -> tuple[object, ...]:

@@ -134,6 +134,12 @@ def _noise(runs: Sequence[SeriesRun], mapped: SeriesMap, name: str) -> float:
     runs' own. Raises RigFileError where it cannot be estimated.
     """
     column = mapped.columns[name]
+    if not any(np.any(np.isfinite(run.table.column(name).numbers)) for run in runs):
+        raise RigFileError(
+            f"{runs[0].table.path}: {name}: found no number in it; expected some, or no line of "
+            "this column in the map",
+            USAGE,
+        )
     if column.noise is not None:
         return column.noise / column.per_unit
 
@@ -251,7 +257,7 @@ def _of_one_clock(seconds: Array, columns: list[Array]) -> list[Array]:
     """
     counts = [int(np.isfinite(column).sum()) for column in columns]
     together = int(np.logical_and.reduce([np.isfinite(c) for c in columns]).sum())
-    if together > TOGETHER * min(counts):
+    if together > TOGETHER * min(counts) or not min(counts):
         return columns
 
     slowest = np.isfinite(columns[int(np.argmin(counts))])

@@ -218,7 +218,7 @@ class _Table:
         """
         separator, width = self._form.separator, self._form.width
         text = "".join(lines)
-        if '"' in text or "\0" in text:
+        if '"' in text or "\0" in text or self._needed > width:
             return None
         if separator != " " and {line.count(separator) for line in lines} != {width - 1}:
             return None

@@ -24,6 +24,7 @@ LATEST = 2**63 - 1  # [ns]
 EXACT = 2.0**53  # below, a float holds every whole number
 DAY, HOUR = 86_400 * NS, 3_600 * NS
 EPOCH = date(1970, 1, 1).toordinal()
+DATENUM = -719_529 * DAY  # where MATLAB's numbers of days begin [ns since 1970]
 ORDERS = ("year-month-day", "day-month-year", "month-day-year")
 NAMES = "jan|feb|mar mär|apr|may mai|jun|jul|aug|sep|oct okt|nov|dec dez"
 MONTHS = {
@@ -251,7 +252,7 @@ def of_texts(words: Sequence[str], unit: int) -> Nanoseconds:
         values = np.array(list(map(float, words)))
         if (made := of_floats(values, unit)) is not None:
             return made
-        if np.max(np.abs(values)) * unit < 0.999 * LATEST:
+        if float(np.max(np.abs(values))) * unit < 0.999 * LATEST:
             return np.array(list(map(int, words)), dtype=np.int64) * unit
     except ValueError:  # a gap, a decimal comma, a fraction with many digits
         pass
@@ -260,7 +261,7 @@ def of_texts(words: Sequence[str], unit: int) -> Nanoseconds:
 
 def of_floats(values: Array, unit: int) -> Nanoseconds | None:
     """Numbers (n,) in a unit of so many ns; None where any is none, or too large to be exact."""
-    if not np.max(np.abs(values), initial=0.0) * unit < EXACT:
+    if not float(np.max(np.abs(values), initial=0.0)) * unit < EXACT:
         return None
     return np.round(values * unit).astype(np.int64)
 

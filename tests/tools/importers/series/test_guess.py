@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import gritd
 from gritd.tools.commands.import_rig import main
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.guess import guessed
@@ -239,3 +240,38 @@ def test_a_column_that_another_file_lacks_is_not_proposed(tmp_path: Path) -> Non
     other = csv_text.read(written(tmp_path / "b", ["Zeit [s]", "Einsinkung [mm]"]))
     text = guessed([table, other])
     assert "'Zeit [s]': {channel: time" in text and "channel: drawbar_pull" not in text
+
+
+@pytest.mark.parametrize("days", [739_947.5, 46_352.5])  # of MATLAB and of a spreadsheet: one noon
+def test_numbers_of_days_are_dates(tmp_path: Path, days: float) -> None:
+    columns = {"time": [f"{days + at / 86_400 / 50:.10f}" for at in range(ROWS)]}
+    columns |= {name: cells(name, at) for at, name in enumerate(["wheel rpm", "cart mm/s"])}
+    columns |= {"axle torque Nm": cells("torque", 3)}
+    path = tmp_path / "run.csv"
+    rows = [",".join(columns), *map(",".join, zip(*columns.values(), strict=True))]
+    path.write_text("\n".join(rows), encoding="utf-8")
+
+    text = guessed([csv_text.read(path)])
+    (tmp_path / "map.yaml").write_text(f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n")
+    out = tmp_path / "out"
+    assert main(["series", str(path), "--map", f"{tmp_path}/map.yaml", "-o", str(out)]) == 0
+    stamps = gritd.read(out / "run.mcap")["raw/wheel_encoder"]["stamp"]
+    noon = np.datetime64("2026-11-26T12:00", "ns").astype(np.int64)
+    assert abs(int(stamps[0]) - noon) < 50_000 and abs(np.median(np.diff(stamps)) - 2e7) < 1e5
+
+
+def test_a_topic_that_every_bag_has_is_in_each(tmp_path: Path) -> None:
+    """Files of several tables: a column is looked for in all of a file's."""
+    still = {"a.t": np.arange(50) / 50, "a.room": np.full(50, 3.0), "b.t": np.arange(30) / 10.0}
+    for name in ("one", "two"):
+        np.savez(tmp_path / f"{name}.npz", **still)
+    tables = [table for name in ("one", "two") for table in read(tmp_path / f"{name}.npz")]
+    assert "not in" not in guessed(tables)
+
+
+def test_answers_name_the_line_that_they_replace(tmp_path: Path) -> None:
+    """A torque whose side is asked, beside one whose side is known."""
+    names = ["time_s", "wheel rpm", "cart mm/s", "axle torque [Nm]", "torque [lbf-in]"]
+    text, _, asked = proposed(written(tmp_path, names))
+    line = next(line for line in text.splitlines() if "channel: torque" in line and "lbf" in line)
+    assert names[-1] in asked and "in the place of 'axle torque [Nm]'" in line

@@ -368,3 +368,19 @@ def test_a_stamp_keeps_its_nanoseconds(tmp_path: Path) -> None:
         output = imported(tmp_path, tmp_path / "run.csv", text=text)
         found = read(output / "run.mcap").arrays("/raw/wheel_encoder")["stamp"]
         assert found.tolist() == stamps
+
+
+def test_series_and_csv_are_one_command(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="--map"):
+        main(["series", str(tmp_path)])
+    with pytest.raises(CommandError, match="--map"):
+        main(["csv", str(tmp_path)])
+
+
+def test_a_column_without_any_number_is_named(tmp_path: Path) -> None:
+    log = table(tmp_path)
+    lines = log.read_text().splitlines()
+    log.write_text("\n".join([lines[0], *(line.rpartition(",")[0] + ",nan" for line in lines[1:])]))
+    (tmp_path / "map.yaml").write_text(MAP)
+    options = (log, "--map", tmp_path / "map.yaml", "-o", tmp_path / "out")
+    assert "M: found no number" in complaint(USAGE, *options)

@@ -7,6 +7,7 @@ import gzip
 import lzma
 import zipfile
 from collections.abc import Callable, Sequence
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.columns import SeriesTable
 from gritd.tools.importers.series.mapping import Mapped
+from gritd.tools.importers.series.stamps import TimeColumn
 
 N = 120
 TIMES = np.arange(N) * 0.02
@@ -322,3 +324,30 @@ def test_any_bytes_are_a_table_or_one_line(
         table(folder, text().encode()[: 500 if behind else 0] + data)
     except CommandError as error:
         assert "\n" not in str(error) and len(str(error)) - len(str(folder)) < 300
+
+
+# --- the quick way is the other way, quicker ---
+
+
+@given(
+    st.lists(st.decimals(-(10**10), 10**10, places=9), min_size=1, max_size=20),
+    st.sampled_from(["s", "ms", "us", "ns", "h"]),
+)
+def test_numbers_that_are_times_become_what_their_words_do(
+    given_: list[Decimal], unit: str
+) -> None:
+    words = [f"{number:f}" for number in given_]
+    column = TimeColumn(Mapped("time", unit))
+    quick = column.plain(np.array(list(map(float, words))))
+    assert quick is None or quick.tolist() == column.read(words).tolist()
+
+
+def test_blanks_within_fields_between_tabs(tmp_path: Path) -> None:
+    """A date and its time are one field, and a gap is one too."""
+    rows = [(*row, "26.11.2026 14:03:05", "", "") for row in ROWS]
+    check(table(tmp_path, text("\t", "t,rpm,v,since,no,nothing", rows)))
+
+
+def test_rows_that_lack_a_column_of_the_map(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="fewer than 3 fields"):
+        table(tmp_path, text(rows=[row[:2] for row in ROWS]))

@@ -25,7 +25,7 @@ from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.config.yamltree import Mapping as Tree
 from gritd.estimator.config.yamltree import Node, compose, read_text
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.importers.series.times import DATENUM, ORDERS, TimeFormatError, clock
+from gritd.tools.importers.series.times import ORDERS, TimeFormatError, clock
 
 # channel of the map -> SI unit and meaning
 MEASURED = {
@@ -310,9 +310,7 @@ def _measured(name: str, si: str) -> Section:
 
 def _time(order: str | None = None, epoch: str | None = None, **values: Any) -> Mapped:
     try:
-        day = DATENUM if epoch == "datenum" else 0
-        if epoch and not day:
-            day = int(clock([epoch]).read([epoch])[0])
+        day = int(clock([epoch]).read([epoch])[0]) if epoch else 0
     except TimeFormatError as error:
         raise Impossible("epoch", f"a day such as 1904-01-01 ({error})", epoch or "") from None
     return Mapped(**{"unit": CLOCK} | values, order=order or "", epoch=day)

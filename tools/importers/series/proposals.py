@@ -18,10 +18,7 @@ from gritd.tools.importers.series.stamps import TimeColumn
 from gritd.tools.importers.series.times import ORDERS, TimeFormatError, likely_unit
 
 OFTEN = (2e-4, 1.0)  # [s] between the rows of a log: the unit of time that gives this is likely
-DAYS = {  # what numbers of days, with fractions, lie between from 1982 on
-    "d, epoch: 1899-12-30": (30_000.0, 80_000.0),  # of a spreadsheet
-    "d, epoch: datenum": (724_000.0, 775_000.0),  # of MATLAB
-}
+DAYS = (30_000.0, 80_000.0)  # what numbers of days of a spreadsheet lie between from 1982 on
 EVEN = 0.05  # share of its usual step by which an even column's steps may differ
 FORCES = ("drawbar_pull", "load", "lateral_force")
 SIDES = {
@@ -127,9 +124,8 @@ def _units_of_time(known: Array, unit: Unit | None) -> tuple[list[str], str]:
 
     step = float(np.median(np.abs(np.diff(known))))
     low, high = OFTEN
-    for name, (least, most) in DAYS.items():
-        if least < np.median(known) < most and low < step * 86_400.0 <= high:
-            return [name], "days"
+    if DAYS[0] < np.median(known) < DAYS[1] and low < step * 86_400.0 <= high:
+        return ["d, epoch: 1899-12-30"], "days of a spreadsheet"
     sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     likely = [name for name, size in sizes.items() if low < step * size <= high]
     return likely or ["s"], f"rows {step:.4g} apart"

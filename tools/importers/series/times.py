@@ -24,7 +24,6 @@ LATEST = 2**63 - 1  # [ns]
 EXACT = 2.0**53  # below, a float holds every whole number
 DAY, HOUR = 86_400 * NS, 3_600 * NS
 EPOCH = date(1970, 1, 1).toordinal()
-DATENUM = -719_529 * DAY  # where MATLAB's numbers of days begin [ns since 1970]
 ORDERS = ("year-month-day", "day-month-year", "month-day-year")
 NAMES = "jan|feb|mar mär|apr|may mai|jun|jul|aug|sep|oct okt|nov|dec dez"
 MONTHS = {

@@ -242,8 +242,8 @@ def test_a_column_that_another_file_lacks_is_not_proposed(tmp_path: Path) -> Non
     assert "'Zeit [s]': {channel: time" in text and "channel: drawbar_pull" not in text
 
 
-@pytest.mark.parametrize("days", [739_947.5, 46_352.5])  # of MATLAB and of a spreadsheet: one noon
-def test_numbers_of_days_are_dates(tmp_path: Path, days: float) -> None:
+def test_days_of_a_spreadsheet_are_dates(tmp_path: Path) -> None:
+    days = 46_352.5  # a noon
     columns = {"time": [f"{days + at / 86_400 / 50:.10f}" for at in range(ROWS)]}
     columns |= {name: cells(name, at) for at, name in enumerate(["wheel rpm", "cart mm/s"])}
     columns |= {"axle torque Nm": cells("torque", 3)}

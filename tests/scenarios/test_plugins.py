@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 
+import pytest
+
 from tests.plugin_package import made, offer, python
+from tests.scenarios.conftest import slow
 
 PLUGINS = "plug-in that ends the program, raises, hangs"
 COMMANDS = "the commands as processes"
 OFFERED = (
     ("effects", "second = my_rig.ends", ("effects",)),
-    ("effects", "second = my_rig.hangs", ("effects",)),
     ("effects", "third = my_rig.nowhere:X", ("effects",)),
     ("importers", "badarg = my_rig.badarg", ("import", "--help")),
     ("importers", "mylab = my_rig.ends", ("import", "--help")),
@@ -18,15 +20,17 @@ OFFERED = (
     ("sensors", "sinkage_pot = my_rig.ends", ("check-config",)),
     ("sensors", "sinkage_pot = my_rig.mylab", ("check-config",)),
 )
+HANGS = ("effects", "second = my_rig.hangs", ("effects",))
 OWN = {"effects": "bulldozing", "import": "cmu"}
 
 
-def test_plugins_that_are_wrong(tmp_path, figure):
+@pytest.mark.parametrize("offered", [OFFERED, slow((HANGS,))], ids=["wrong", "hangs"])
+def test_plugins_that_are_wrong(tmp_path, offered, figure):
     """Each is named with its package in one line; what is gritd's own works on, and what would
     need the plug-in ends with code 2.
     """
     package, wrong, longest = made(tmp_path), [], 0.0
-    for group, line, command in OFFERED:
+    for group, line, command in offered:
         offer(package, f"[gritd.{group}]\n{line}\n")
         began = time.monotonic()
         done = python(package, "-m", "gritd", *command)
@@ -37,6 +41,6 @@ def test_plugins_that_are_wrong(tmp_path, figure):
         works = done.returncode == 0 and own in done.stdout if own else done.returncode == 2
         wrong += [] if named and works else [(line, done)]
     assert not wrong, wrong
-    figure(PLUGINS, COMMANDS, "plug-ins", len(OFFERED))
+    figure(PLUGINS, COMMANDS, "plug-ins", len(offered))
     figure(PLUGINS, COMMANDS, "not named in one line, or in the way of others", 0, limit=0)
     figure(PLUGINS, COMMANDS, "longest until then", longest, "s", 15, real=True)

@@ -254,7 +254,8 @@ def _part(
         )
 
     made = replace(table, columns=columns, group="", clock=None)
-    if len(tables) > 1 or table.clock is not None or len(columns) < len(places):
+    clocked = len(tables) > 1 or table.clock is not None or len(columns) < len(places)
+    if clocked and rate is None:  # a rate counts the empty rows too
         made = made.at(_filled([columns[source.label(name)] for name in names]))
     return Part(made, replace(mapped, columns=kinds, rate=rate), source.shift)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+import gritd
 from gritd.config import packaged
 from gritd.estimator.recording.salvage import read
 from gritd.tools import main as cli
@@ -192,3 +193,24 @@ load: 50 N
 )
 def test_a_run_is_called_by_its_file(name: str, run: str) -> None:
     assert stem(name) == run
+
+
+def test_a_rate_of_one_column_counts_its_empty_rows(tmp_path: Path) -> None:
+    """A pull that begins late, and has a gap, was still read so many times a second."""
+    rows = [
+        f"{at / 50:.2f},{at},{3 * at},{9 + at % 3},{'' if at < 30 or at == 60 else at}"
+        for at in range(120)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["t,w,v,z,F", *rows]) + "\n")
+    (tmp_path / "map.yaml").write_text(
+        "columns:\n  t: {channel: time, unit: s}\n  w: {channel: wheel_angle, unit: deg}\n"
+        "  v: {channel: carriage_position, unit: mm}\n  z: {channel: sinkage, unit: mm}\n"
+        "  F: {channel: drawbar_pull, unit: N, rate: 50 Hz}\n"
+        "wheel: {radius: 72 mm, width: 71 mm}\nload: 70 N\n"
+    )
+    options = ("--map", f"{tmp_path}/map.yaml", "-o", f"{tmp_path}/out")
+    assert main(["series", str(tmp_path / "a.csv"), *options]) == 0
+    run = gritd.read(tmp_path / "out" / "a.mcap")
+    forces, wheel = run["raw/wrench"]["stamp"], run["raw/wheel_encoder"]["stamp"]
+    expected = [wheel[at] for at in range(120) if at >= 30 and at != 60]
+    assert np.allclose(forces - wheel[0], np.array(expected) - wheel[0], atol=1000)

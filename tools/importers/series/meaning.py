@@ -51,8 +51,8 @@ def unit_of(table: SeriesTable, name: str) -> Unit | None:
         (table.units or {}).get(name, ""),
         *reversed(names.IN_BRACKETS.findall(name)),
         f"{rate[1]}/s" if rate else "",
-        ending[1] if ending else "",
-        name if len(name) > 1 or name.isupper() else "",  # v is no volt
+        ending[1] if ending and ending[1] != "v" else "",  # data.v is no volt
+        name if len(name) > 1 or name.isupper() else "",
     )
     for text in texts:
         if text and (known := names.unit_of(text)) is not None:
@@ -189,7 +189,9 @@ def _unnamed(
     if "angle" in means and not speed:
         return Meaning("wheel_angle", 1)
     if speed:
-        whose = "whether it is the carriage's" if words <= {"v", "vx"} else ""
+        whose = (
+            "whether it is the carriage's" if "speed" not in means and words & {"v", "vx"} else ""
+        )
         return Meaning("carriage_speed", 1, whose)
     if "position" in means or "x" in words:
         return Meaning("carriage_position", 1)

@@ -79,10 +79,9 @@ class Smoother:
         if not complete:
             return None
         first = memory.stretches[memory.since]
-        member = leading(bank)
-        before = (memory.anchor if first.changed is None else first.changed)[member]
-        own = FORM.own[member]
-        lines = [stretch.line.missed(own) for stretch in complete if stretch.line is not None]
+        before = (memory.anchor if first.changed is None else first.changed)[leading(bank)]
+        sensors = max(FORM.own)  # what they do by themselves is no change of the soil
+        lines = [stretch.line.missed(sensors) for stretch in complete if stretch.line is not None]
         windows = [stretch.windows for stretch in complete]
         return judge(before, self._doubted(doubt), lines, windows)
 

@@ -16,7 +16,7 @@ leaves.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, log, sqrt
+from math import exp, log
 
 from gritd.estimator.filter.estimate import Estimate, Vector, mixed
 from gritd.estimator.filter.tuning import FORM
@@ -43,12 +43,6 @@ def leading(bank: Bank) -> int:
     """Number of the most probable member."""
     each = weights(bank)
     return max(range(len(each)), key=each.__getitem__)
-
-
-def own_error(bank: Bank) -> float:
-    """Root mean square of the error that a stretch has of its own, by the weights of the sizes."""
-    squares = [weight * own * own for weight, own in zip(weights(bank), FORM.own, strict=True)]
-    return sqrt(_sum(squares))
 
 
 def misfit(bank: Bank) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import Bank, leading, own_error
+from gritd.estimator.filter.bank import Bank, leading
 from gritd.estimator.filter.change import Judgement, judge
 from gritd.estimator.filter.engine import Engine
 from gritd.estimator.filter.estimate import (
@@ -80,8 +80,9 @@ class Smoother:
             return None
         first = memory.stretches[memory.since]
         before = (memory.anchor if first.changed is None else first.changed)[leading(bank)]
-        own = own_error(bank)
-        lines = [stretch.line.missed(own) for stretch in complete if stretch.line is not None]
+        lines = [
+            stretch.line.missed(FORM.usual) for stretch in complete if stretch.line is not None
+        ]
         windows = [stretch.windows for stretch in complete]
         return judge(before, self._doubted(doubt), lines, windows)
 

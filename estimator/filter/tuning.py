@@ -7,6 +7,7 @@ What follows when one is halved or doubled stands in docs/filter.md, measured by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,14 @@ class FormTuning:
         and no larger than what sensors and their filters do.
         """
         return tuple([min(size, self.sizes[self.holding - 1]) for size in self.sizes])
+
+    @property
+    def usual(self) -> float:
+        """That error where the equations hold: halfway, by ratio, between the sizes that say so. A
+        change of the soil is judged beside it. With the smaller, unchanged soil has three flags an
+        hour; with the larger, 6 % of a ramp is beyond 3 σ unflagged.
+        """
+        return sqrt(self.own[0] * self.own[self.holding - 1])
 
     # Their probabilities before the run. Judgement: half of the rigs obey their equations.
     odds: tuple[float, ...] = (0.25, 0.25, 0.25, 0.25)

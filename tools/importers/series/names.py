@@ -202,24 +202,25 @@ def unit_of(text: str) -> tuple[str, float] | None:
     return known.get(plain) or known.get(plain.replace(" ", ""))
 
 
-def words_of(name: str) -> list[str]:
+@lru_cache(maxsize=4096)
+def words_of(name: str) -> tuple[str, ...]:
     """The words of a name, and its characters of other scripts together: `wheelSpeed_rpm` has
     three.
     """
     plain = folded(CAMEL.sub(" ", name))
-    return [word for word in re.split(r"[^a-zωθ\u0250-\uffff]+", plain) if word]
+    return tuple([word for word in re.split(r"[^a-zωθ\u0250-\uffff]+", plain) if word])
 
 
 def meanings(name: str) -> set[str]:
     """What the words of a name mean, of WORDS."""
+    return set().union(*[_meanings_of(word) for word in words_of(name)])
+
+
+@lru_cache(maxsize=4096)
+def _meanings_of(word: str) -> frozenset[str]:
     whole, parts = _entries()
-    found: set[str] = set()
-    for word in words_of(name):
-        found |= whole.get(word, set())
-        for way, part, meaning in parts:
-            if _holds(word, way, part):
-                found.add(meaning)
-    return found
+    held = [meaning for way, part, meaning in parts if _holds(word, way, part)]
+    return frozenset(whole.get(word, set()).union(held))
 
 
 def _holds(word: str, way: str, part: str) -> bool:

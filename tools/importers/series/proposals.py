@@ -62,7 +62,8 @@ def proposal(tables: Sequence[SeriesTable], name: str) -> Proposal | None:
     """For a column of the first table; the others are those of the other files."""
     table = tables[0]
     unit = unit_of(table, name)
-    meaning = meaning_of(table.short(name), unit) or meaning_of(name, unit)
+    asked = dict.fromkeys((table.short(name), name))
+    meaning = next(filter(None, (meaning_of(each, unit) for each in asked)), None)
     if meaning is None:
         return None
     if meaning.channel in (TIME, DATE):

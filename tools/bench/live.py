@@ -26,7 +26,7 @@ from gritd.tools.cli.command import FAILED, CommandError
 READY = 120.0  # [s] the longest that the testbed or a device may take
 SETTLED = 3.0  # [s] after the command everything has been opened and imported
 # [s] for which the testbed plays before the command, so that the wheel drives steadily, and after
-BEFORE, SPARE = 2.0, 10.0
+BEFORE, SPARE = 2.0, 40.0
 QUANTILES = (("median", 0.5), ("at_99_percent", 0.99), ("at_99.9_percent", 0.999), ("worst", 1.0))
 
 Figures = dict[str, float]
@@ -53,23 +53,24 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
             Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "live") as daemon,
         ):
             settled, started, begun = 0.0, 0.0, inf
-            while (elapsed := time.monotonic() - clock) < min(begun, SPARE) + seconds:
+            while (elapsed := time.monotonic() - clock) < min(begun, SPARE - SETTLED) + seconds:
                 daemon.line(0.2)
                 if begun == inf and any(folder.glob("*.mcap")):
-                    begun = elapsed
-                if not settled and elapsed > max(SETTLED, begun):
+                    begun = elapsed + SETTLED
+                if not settled and elapsed > begun:
                     settled, started = elapsed, _used(daemon.pid)[0]
             used, memory = _used(daemon.pid)
             daemon.stop()
             control.stop()
 
-    if begun == inf:
+    recordings = [read(path) for path in folder.glob("*.mcap")]
+    if not recordings or not np.any(recordings[0].arrays("/tick")["updates"]):
         raise CommandError(
-            f"bench: the daemon recorded nothing within {SPARE + seconds:.0f} s: the machine is "
-            "too busy; repeat when it does less",
+            f"bench: the daemon made no estimate within {elapsed:.0f} s: the machine is too busy; "
+            "repeat when it does less",
             FAILED,
         )
-    recording = read(next(folder.glob("*.mcap")))
+    recording = recordings[0]
     loop = recording.arrays("/loop")
     return {
         **_started(recording.arrays("/tick"), began),

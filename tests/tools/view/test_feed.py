@@ -45,11 +45,11 @@ def test_frames_and_curves_hold_what_the_daemon_says(followed: Any, tmp_path: Pa
     with daemon(tmp_path / "gritd.sock"):
         for _ in range(3):
             frame = until(frames, is_live)
+        time, columns, way = feed.stretch(None, 60.0, 100)
     assert frame["values"][0] == {"label": "c", "value": "812", "sigma": "35", "unit": "Pa"}
     assert frame["prior"]["cohesion"] == [1000.0, 300.0]
     assert frame["row"][:3] == [812.0, 742.0, 882.0]  # the line, and the edges of ± 2σ
 
-    time, columns, way = feed.stretch(None, 60.0, 100)
     assert len(time) >= 3 and time[-1] >= frame["time"]
     assert columns[-1, :3].tolist() == frame["row"][:3]
     assert way[-1].tolist() == pytest.approx([812.0, 0.5771])

@@ -34,7 +34,7 @@ from gritd.estimator.wheel.wheel_state import WheelState, slip_over
 
 CAPACITY = 36  # stretches that are linearised anew
 SHORTEST = 5  # windows merged into one stretch while it is recent …
-LONGEST = 40  # … and at most
+LONGEST = 160  # … and at most
 AGEING = 4  # a stretch may hold a quarter of the windows that came after it
 STEADY = 3  # windows that make a stretch one of steady motion
 SAME_SLIP = 0.02

@@ -4,7 +4,7 @@ A slope over a time span has an error that falls with the span to the power of 3
 slopes of n windows within it has n times that error. So consecutive windows are one regression:
 what lies within the windows, their own slopes, and what lies between them, the mean positions, are
 summed up (the sums of squares of an analysis of covariance). Windows that do not follow each other
-have their slopes in common, and nothing in between.
+may have been driven at another slip: then the slopes count by their windows, as torque and pull do.
 """
 
 from __future__ import annotations
@@ -32,16 +32,27 @@ class Piece(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Squares and products about the means of the pieces, a reading a second."""
+    """Squares and products about the means of a piece, a reading a second."""
 
     spread: float  # [s²] of t
-    within: float  # [s²] of it, that within the windows
     by_rim: float  # [s m] of t and the rim's way
     by_travel: float  # [s m] of t and the travel
 
     def plus(self, other: Sums) -> Sums:
-        """Of the pieces of both."""
+        """Of both."""
         return Sums(*[a + b for a, b in zip(self, other, strict=True)])
+
+
+class Past(NamedTuple):
+    """Sums over the pieces before the last, each by its windows."""
+
+    rim: float = 0.0  # [m/s] of the slopes
+    travel: float = 0.0  # [m/s]
+    variance: float = 0.0  # [1/s²] of the slopes, for readings of unit noise
+
+    def plus(self, other: Past) -> Past:
+        """Of both."""
+        return Past(*[a + b for a, b in zip(self, other, strict=True)])
 
 
 class Odometry(NamedTuple):
@@ -51,19 +62,28 @@ class Odometry(NamedTuple):
     at: int  # centre of the first window [ns]
     length: float  # of a window [s]
     piece: Piece  # the last one
-    sums: Sums
+    sums: Sums  # of the last piece
+    past: Past
     undone: tuple[float, float]  # [m/s] mean of what effects add to both speeds
 
     @property
     def speeds(self) -> tuple[float, float]:
         """rω and v [m/s], effects accounted for."""
-        sums, (rim, travel) = self.sums, self.undone
-        return sums.by_rim / sums.spread + rim, sums.by_travel / sums.spread + travel
+        whole, (rim, travel) = self._whole, self.undone
+        return whole.rim / self.windows + rim, whole.travel / self.windows + travel
 
     @property
     def narrowing(self) -> float:
         """σ of a speed over that of the mean of the windows' speeds, 0 … 1."""
-        return sqrt(self.sums.within / self.sums.spread)
+        return sqrt(self.length**3 / 12.0 * self._whole.variance / self.windows)
+
+    @property
+    def _whole(self) -> Past:
+        """Over all pieces."""
+        windows, sums = self.piece.windows, self.sums
+        weight = windows / sums.spread
+        last = Past(weight * sums.by_rim, weight * sums.by_travel, windows * weight)
+        return self.past.plus(last)
 
     def joined(self, after: Odometry) -> Odometry:
         """These windows and later ones."""
@@ -73,11 +93,13 @@ class Odometry(NamedTuple):
         undone = (rim + (rim_after - rim) * share, travel + (travel_after - travel) * share)
 
         last, moved = after.piece, (after.at - self.at) / NS
-        last, sums = last._replace(time=last.time + moved), self.sums.plus(after.sums)
+        last = last._replace(time=last.time + moved)
         if self._followed_by(last, after):
-            sums = sums.plus(self._between(last))
-            last = self.piece.joined(last)
-        return Odometry(windows, self.at, self.length, last, sums, undone)
+            sums = self.sums.plus(after.sums).plus(self._between(last))
+            last, past = self.piece.joined(last), self.past
+        else:
+            sums, past = after.sums, self._whole.plus(after.past)
+        return Odometry(windows, self.at, self.length, last, sums, past, undone)
 
     def _followed_by(self, piece: Piece, after: Odometry) -> bool:
         """Whether later windows are one piece, and begin where this one's last ends."""
@@ -93,7 +115,7 @@ class Odometry(NamedTuple):
         weight = self.length * mine.windows * share
         time = piece.time - mine.time
         rim, travel = piece.rim - mine.rim, piece.travel - mine.travel
-        return Sums(weight * time * time, 0.0, weight * time * rim, weight * time * travel)
+        return Sums(weight * time * time, weight * time * rim, weight * time * travel)
 
 
 def of_window(
@@ -108,5 +130,5 @@ def of_window(
     """
     within = length**3 / 12.0
     rim, travel = speeds
-    sums = Sums(within, within, rim * within, travel * within)
-    return Odometry(1, at, length, Piece(1, 0.0, *ways), sums, undone)
+    sums = Sums(within, rim * within, travel * within)
+    return Odometry(1, at, length, Piece(1, 0.0, *ways), sums, Past(), undone)

@@ -69,6 +69,18 @@ def test_what_lies_between_windows_that_do_not_follow_each_other_says_nothing():
     assert gap.narrowing == pytest.approx(0.5)
 
 
+@given(st.integers(1, 9), st.integers(1, 9))
+def test_windows_at_two_slips_give_their_mean(one, other):
+    """As torque and drawbar pull are means."""
+    time, rim, travel = readings(one + other, noise=0.0)
+    parts = of_readings(time, rim, travel)
+    later = of_readings(time, 1.5 * rim, travel)[one:]
+    apart = [part._replace(at=part.at + NS) for part in later]  # a second, unseen, between them
+    whole = all_of(parts[:one]).joined(all_of(apart))
+    expected = 0.04 * (one + 1.5 * other) / (one + other)
+    assert whole.speeds == pytest.approx((expected, 0.03), rel=1e-5)
+
+
 def test_sigma_is_narrowed_by_as_much_as_the_error_is():
     windows, errors = 5, []
     alone = slope(*readings(1, noise=0.0)[:2])

@@ -14,6 +14,26 @@ export const path = points => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toF
 
 const BOX = {left: 62, right: 466, top: 26, bottom: 286};
 
+const CENTRE = {x: (BOX.left + BOX.right) / 2, y: (BOX.top + BOX.bottom) / 2};
+
+// Values to places in a box, and points to a path.
+const scaled = (box, xs, ys) => {
+  const X = v => box.left + (v - xs[0]) / (xs[1] - xs[0]) * (box.right - box.left);
+  const Y = v => box.bottom - (v - ys[0]) / (ys[1] - ys[0]) * (box.bottom - box.top);
+  return [X, Y, points => path(points.map(([x, y]) => [X(x), Y(y)]))];
+};
+
+// The estimate in its prior, where the prior is far wider than what is drawn: in a corner that is free.
+const inset = (svg, ranges, outline, stated, below) => {
+  const box = below
+    ? {left: BOX.left + 8, right: BOX.left + 128, top: BOX.bottom - 98, bottom: BOX.bottom - 8}
+    : {left: BOX.right - 128, right: BOX.right - 8, top: BOX.top + 8, bottom: BOX.top + 98};
+  const [, , at] = scaled(box, ...ranges);
+  picture(svg, "rect", {class: "inset", x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top});
+  picture(svg, "path", {class: "prior", d: at(stated)});
+  picture(svg, "path", {class: "ellipse", d: at(outline) + "Z"});
+};
+
 export const plane = (svg, told, ellipse, way, prior) => {
   svg.replaceChildren();
   if (!ellipse) { told.textContent = "No estimate yet."; svg.setAttribute("aria-label", told.textContent); return; }
@@ -27,9 +47,7 @@ export const plane = (svg, told, ellipse, way, prior) => {
   const near = ranges([...outline, ...passed]), far = ranges([...outline, ...passed, ...stated]);
   const wide = far.some(([low, high], i) => high - low > 2.5 * (near[i][1] - near[i][0])); // the prior would make the rest tiny
   const [xs, ys] = wide ? near : far;
-  const X = v => BOX.left + (v - xs[0]) / (xs[1] - xs[0]) * (BOX.right - BOX.left);
-  const Y = v => BOX.bottom - (v - ys[0]) / (ys[1] - ys[0]) * (BOX.bottom - BOX.top);
-  const at = points => path(points.map(([x, y]) => [X(x), Y(y)]));
+  const [X, Y, at] = scaled(BOX, xs, ys);
 
   for (const v of svgTicks(...xs)) {
     picture(svg, "line", {class: "grid", x1: X(v), x2: X(v), y1: BOX.top, y2: BOX.bottom});
@@ -50,10 +68,11 @@ export const plane = (svg, told, ellipse, way, prior) => {
   picture(plot, "path", {class: "way", d: at(passed)});
   picture(plot, "path", {class: "ellipse", d: at(outline) + "Z"});
   picture(plot, "circle", {class: "centre", cx: X(ellipse.c), cy: Y(ellipse.tan_phi), r: 3.5});
+  if (known && wide) inset(svg, far, outline, stated, X(ellipse.c) > CENTRE.x && Y(ellipse.tan_phi) < CENTRE.y);
 
   const words = `Filled: the estimate within 2σ, c ${written(ellipse.c, 0)} ± ${written(ellipse.ax / 2, 0)} Pa, tan φ ` +
-    `${written(ellipse.tan_phi, 4)} ± ${written(Math.hypot(ellipse.ay, ellipse.by) / 2, 4)}. Line: its way in this window.` +
-    (known ? ` Dashed: the stated prior, c ${written(known[0][0], 0)} ± ${written(known[0][1], 0)} Pa, tan φ ${written(known[1][0], 3)} ± ${written(known[1][1], 3)}.` : "");
+    `${written(ellipse.tan_phi, 4)} ± ${written(Math.hypot(ellipse.ay, ellipse.by) / 2, 4)}. Line: its path in this window.` +
+    (known ? ` Dashed${wide ? ", in the small picture at its own scale" : ""}: the stated prior, c ${written(known[0][0], 0)} ± ${written(known[0][1], 0)} Pa, tan φ ${written(known[1][0], 3)} ± ${written(known[1][1], 3)}.` : "");
   told.textContent = words;
   svg.setAttribute("aria-label", words);
 };

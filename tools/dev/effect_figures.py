@@ -280,9 +280,9 @@ def _menu() -> str:
 
 MENU = """## Experiments that tell effects apart
 
-`python -m gritd.tools.dev.separation` prints what each of them gains, in standard deviations, for
-every pair named above: the soil within its prior and the other effect are fitted to what the effect
-changes, on a campaign without the experiment and on the same with it.
+Simulated for every pair named above (`tests/estimator/effects/test_separation.py`): the soil within
+its prior and the other effect are fitted to what the effect changes, on a campaign without the
+experiment and on the same with it. With it, more than two standard deviations are left.
 """
 
 

@@ -14,7 +14,7 @@ from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.topics import TOPICS
 from gritd.tools import main as cli
 from gritd.tools.commands import simulate
-from gritd.tools.dev import six_runs
+from tests.tools.commands import six_runs
 
 SOIL = {"c": 1250.0, "tan_phi": 0.55}
 

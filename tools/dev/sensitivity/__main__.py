@@ -1,7 +1,7 @@
 """How far a diagnosis moves when a tuned number is halved or doubled.
 
     python -m gritd.tools.dev.sensitivity CAMPAIGNS RESULTS [--only NAME …] [--fields ROOM.FIELD …]
-                                          [--jobs N] [--minutes M] [--out docs/sensitivity.md]
+                                          [--jobs N] [--minutes M] [--out FILE]
 
 CAMPAIGNS is a folder of campaigns, each of recordings and one configuration (`twenty make` makes
 some). Each is diagnosed twice as it is, to see what it reads and to fork from. RESULTS is a file
@@ -67,7 +67,7 @@ def _parser() -> argparse.ArgumentParser:
 
     parser.add_argument("--jobs", type=int, default=1, help="diagnoses at once")
     parser.add_argument("--minutes", type=float, default=math.inf, help="end after so long")
-    parser.add_argument("--out", type=Path, default=Path("docs/sensitivity.md"), metavar="FILE")
+    parser.add_argument("--out", type=Path, default=Path("sensitivity.md"), metavar="FILE")
 
     return parser
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gritd.estimator.effects import EFFECTS
-from gritd.tools.dev.separation import SIMULATED, left_over, separation
+from tests.estimator.effects.separation import SIMULATED, left_over, separation
 
 PAIRS = [
     (name, rival, experiment)

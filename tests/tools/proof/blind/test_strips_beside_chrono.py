@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gritd.tools.dev.strips_beside_chrono import stretches
 from tests.real_recordings import REAL, needs
+from tests.tools.proof.blind.strips_beside_chrono import stretches
 
 
 @needs("chrono")

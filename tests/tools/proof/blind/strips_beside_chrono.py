@@ -1,16 +1,11 @@
 """The plant's bed of strips beside Project Chrono's SCM terrain, on the motion that was recorded.
-
-    python -m gritd.tools.dev.strips_beside_chrono --data ../shared/real/chrono
-
 Nothing is fitted: soil and wheel are those of the recordings, the strips' recovery is a middling
 one. Steady stretches only: 2 s after slip or speed changed, to the next change.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -84,26 +79,3 @@ def _means(felt: Felt, inside: Array) -> tuple[float, float, float]:
         float(values[inside].mean()) for values in (felt.sinkage, felt.torque, felt.pull)
     )
     return sinkage, torque, pull
-
-
-def main(argv: Sequence[str]) -> int:
-    """Print the table in Markdown."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
-    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
-    names = sorted(stretches(parser.parse_args(argv).data))
-
-    print("| W [N] | slip | sinkage [mm]: SCM, strips, paper | T [N·m] | DP [N] |")
-    print("|---|---|---|---|---|")
-    for one in names:
-        three = list(zip(one.chrono, one.strips, one.paper, strict=True))
-        sinkage = ", ".join(f"{1e3 * value:.1f}" for value in three[0])
-        torque, pull = (
-            ", ".join(f"{v:.2f}" for v in three[1]),
-            ", ".join(f"{v:.1f}" for v in three[2]),
-        )
-        print(f"| {one.weight:g} | {one.slip:.0%} | {sinkage} | {torque} | {pull} |")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -2,14 +2,12 @@
 it.
 
 What an effect changes is fitted by the soil, within its prior, and by the other effect. What is
-left over, in standard deviations, is what a diagnosis has to tell the two by. `python -m
-gritd.tools.dev.separation` prints it for every pair that an effect's file names; experiments that
-need another instrument or another wheel are not simulated.
+left over, in standard deviations, is what a diagnosis has to tell the two by. Experiments that need
+another instrument or another wheel are not simulated.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import cache
 
@@ -142,18 +140,3 @@ def _segments(have: Have) -> tuple[Segment, ...]:
         drawn += [(load, slip, -SPEED) for load in loads for slip in slips]
 
     return tuple(Segment(HOLD, *condition) for condition in drawn)
-
-
-def main() -> int:
-    """Print every named pair with its experiment, what is left without it and with it."""
-    print(f"{'effect':24}{'looks like':24}{'told apart by':16}{'without':>9}{'with':>9}  [σ]")
-    for name, effect in EFFECTS.items():
-        for rival, experiment in effect.confusable_with.items():
-            if experiment in SIMULATED and not (effect.filter_only or EFFECTS[rival].filter_only):
-                without, with_it = separation(name, rival, experiment)
-                print(f"{name:24}{rival:24}{experiment:16}{without:9.1f}{with_it:9.1f}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,18 +1,11 @@
 """Six runs of the simulator, each at one load, on one bed: what they know together beside what the
-best of them knows alone.
-
-    python -m gritd.tools.dev.six_runs [--seeds 100] [--repeatability 0]
-
-Every seed draws a soil from the stated prior and a testbed whose calibrations are off by their own
-sigmas. With --repeatability the soil of each run is drawn about it: a share of c and of tan φ.
+best of them knows alone. Every seed draws a soil from the stated prior and a testbed whose
+calibrations are off by their own sigmas.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
 import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from math import exp, sqrt
 from pathlib import Path
@@ -30,7 +23,6 @@ from gritd.estimator.offline.bed_runs import BedRun, bed_runs
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.terramechanics.soil import Soil
-from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.drawn_rig import drawn_rig
 from gritd.tools.testbed.run_files import write
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
@@ -129,38 +121,3 @@ def judged(runs: list[BedRun], soil: Soil) -> Outcome:
 def _sigmas(estimate: Estimate) -> tuple[float, float]:
     """Of c [Pa] and of tan φ."""
     return sqrt(estimate.P[C][C]) * KPA, sqrt(estimate.P[TAN_PHI][TAN_PHI])
-
-
-def summary(outcomes: list[Outcome]) -> Iterator[str]:
-    """What all seeds say, in lines."""
-    met = sum(each.met for each in outcomes)
-    yield f"{len(outcomes)} seeds, six runs each at {', '.join(f'{load:g}' for load in LOADS)} N"
-    yield f"inside 2 σ and three times narrower than the best single run: {met} of {len(outcomes)}"
-
-    for name in ("c", "tan_phi"):
-        errors = np.array([getattr(each, name) for each in outcomes])
-        narrower = np.array([getattr(each, f"{name}_narrower") for each in outcomes])
-        yield (
-            f"{name}: error over σ rms {np.sqrt(np.mean(errors**2)):.2f}, inside 2 σ "
-            f"{np.mean(np.abs(errors) <= 2.0):.0%}; narrower {narrower.min():.1f} to "
-            f"{narrower.max():.1f} times, median {np.median(narrower):.1f}"
-        )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=100)
-    parser.add_argument("--repeatability", type=float, default=0.0, metavar="SHARE")
-    arguments = parser.parse_args()
-
-    outcomes = []
-    with Progress("seeds", arguments.seeds) as progress:
-        for seed in range(arguments.seeds):
-            outcomes.append(outcome(seed, arguments.repeatability))
-            progress.advance()
-    print("\n".join(summary(outcomes)))
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    main()

@@ -1,15 +1,16 @@
 """What a tick says of the tracker: measured, estimated and predicted quantities, the filter's
-health, the account of its updates. Each function makes one block of `messages.tick.Tick`.
+health, its updates. Each function makes one block of `messages.tick.Tick`.
 """
 
 from __future__ import annotations
 
 from math import isnan, nan, sqrt
+from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate, soil
 from gritd.estimator.filter.measurement import COMPONENTS, Measurement
 from gritd.estimator.filter.track import TrackState
-from gritd.estimator.filter.tracker import Account
+from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import (
     Aid,
     FilterHealth,
@@ -22,6 +23,23 @@ from gritd.estimator.wheel.wheel_state import WheelState
 
 NO_AIDS = (Aid(0.0, 0.0, 0.0, 0.0, 0.0, False),) * len(COMPONENTS)
 NO_PREDICTIONS = Predictions(*(nan,) * len(Predictions._fields))
+
+
+class Account(NamedTuple):
+    """Result of one tick."""
+
+    snapshot: Snapshot
+    now: WheelState
+    status: Status
+    flags: int  # of Flag
+    aids: tuple[Aid, ...]  # empty where nothing was offered to the filter
+    estimate: Estimate  # what is published: the filter's, or the prior where that is not believed
+    separability: float  # of what is published
+
+    @property
+    def touching(self) -> bool:
+        """Whether the wheel is in the soil, so that there is something to predict."""
+        return self.snapshot.ready and self.now.theta_1.value > 0.0
 
 
 def measurements(snapshot: Snapshot, now: WheelState) -> Measurements:

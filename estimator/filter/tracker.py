@@ -7,11 +7,11 @@ done. It reads no clock and keeps nothing between calls.
 from __future__ import annotations
 
 from math import hypot, inf, log, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.account import Account
 from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
@@ -52,23 +52,6 @@ from gritd.estimator.wheel.wheel_state import (
 
 KNOWN = 0.7  # posterior over prior σ of ln k below which the run has told of k
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
-
-
-class Account(NamedTuple):
-    """What one tick saw and did."""
-
-    snapshot: Snapshot
-    now: WheelState
-    status: Status
-    flags: int  # of Flag
-    aids: tuple[Aid, ...]  # empty where nothing was offered to the filter
-    estimate: Estimate  # what is told: the filter's, or the prior where that is not believed
-    separability: float  # of what is told
-
-    @property
-    def touching(self) -> bool:
-        """Whether the wheel is in the soil, so that there is something to predict."""
-        return self.snapshot.ready and self.now.theta_1.value > 0.0
 
 
 class Tracker:

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
+from gritd.estimator.filter.account import Account, aids, health, measurements, soil_estimate
 from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.reasons import Reason, withheld
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.track import TrackState
-from gritd.estimator.filter.tracker import Account, Tracker
+from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.tick import (
     TICK_FIELDS,
     Aid,

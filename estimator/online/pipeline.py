@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import (
+    Account,
     aids,
     health,
     measurements,
@@ -17,7 +18,7 @@ from gritd.estimator.filter.account import (
 )
 from gritd.estimator.filter.pull import UNKNOWN, Pull, Search, search_on
 from gritd.estimator.filter.track import TrackState
-from gritd.estimator.filter.tracker import Account, Tracker
+from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import Head, LargestPull, Tick, TickRow, row

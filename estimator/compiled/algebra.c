@@ -174,7 +174,24 @@ static PyObject *mixed(PyObject *module, PyObject *const *given, Py_ssize_t coun
     return all;
 }
 
+PyDoc_STRVAR(total_doc, "total(values)\n--\n\nSum of a list, term by term.");
+
+static PyObject *total_of(PyObject *module, PyObject *given) {
+    if (!PyList_Check(given)) {
+        PyErr_SetString(PyExc_ValueError, "expected a list of numbers");
+        return NULL;
+    }
+    double total = 0.0;
+    for (Py_ssize_t n = 0; n < PyList_GET_SIZE(given); n++) {
+        const double value = PyFloat_AsDouble(PyList_GET_ITEM(given, n));
+        if (value == -1.0 && PyErr_Occurred()) return NULL;
+        total += value;
+    }
+    return PyFloat_FromDouble(total);
+}
+
 static PyMethodDef methods[] = {
+    {"total", total_of, METH_O, total_doc},
     {"dot", (PyCFunction)(void (*)(void))dot_of, METH_FASTCALL, dot_doc},
     {"variance", (PyCFunction)(void (*)(void))variance, METH_FASTCALL, variance_doc},
     {"update", (PyCFunction)(void (*)(void))update, METH_FASTCALL, update_doc},

@@ -9,6 +9,7 @@ them on drawn values.
 from __future__ import annotations
 
 try:
+    from gritd.estimator.compiled import algebra
     from gritd.estimator.compiled.algebra import dot, mixed, update, variance
     from gritd.estimator.compiled.closed import Closed
     from gritd.estimator.compiled.record import evidence
@@ -17,4 +18,15 @@ except ImportError:  # no compiler where gritd was installed
 else:
     BUILT = True
 
-__all__ = ["BUILT", "Closed", "dot", "evidence", "mixed", "update", "variance"]
+__all__ = ["BUILT", "Closed", "dot", "evidence", "mixed", "total", "update", "variance"]
+
+
+def total(values: list[float]) -> float:
+    """Sum, term by term: newer versions of Python compensate what `sum` rounds."""
+    if BUILT:
+        return algebra.total(values)
+
+    added = 0.0
+    for value in values:
+        added += value
+    return added

@@ -15,9 +15,9 @@ leaves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import exp, log
 
+from gritd.estimator.compiled.arithmetic import total
 from gritd.estimator.filter.estimate import Estimate, Vector, mixed
 from gritd.estimator.filter.tuning import FORM
 
@@ -29,14 +29,14 @@ def weights(bank: Bank) -> Vector:
     scores = [log(odds) + member.log_evidence for odds, member in zip(FORM.odds, bank, strict=True)]
     best = max(scores)
     each = [exp(score - best) for score in scores]
-    total = _sum(each)
-    return tuple([value / total for value in each])
+    whole = total(each)
+    return tuple([value / whole for value in each])
 
 
 def told(bank: Bank) -> Estimate:
     """What the members say together."""
     hold = weights(bank)[: FORM.holding]
-    return mixed((*bank[: FORM.holding], bank[-1]), (*hold, 1.0 - _sum(hold)))
+    return mixed((*bank[: FORM.holding], bank[-1]), (*hold, 1.0 - total([*hold])))
 
 
 def leading(bank: Bank) -> int:
@@ -47,12 +47,4 @@ def leading(bank: Bank) -> int:
 
 def misfit(bank: Bank) -> float:
     """Probability that the equations do not hold."""
-    return 1.0 - _sum(weights(bank)[: FORM.holding])
-
-
-def _sum(values: Sequence[float]) -> float:
-    """Term by term: newer versions of Python compensate what `sum` rounds."""
-    total = 0.0
-    for value in values:
-        total += value
-    return total
+    return 1.0 - total([*weights(bank)[: FORM.holding]])

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from math import inf, sqrt
 from typing import NamedTuple
 
+from gritd.estimator.compiled.arithmetic import total
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.wheel.geometry import slope_sigma
 
@@ -140,7 +141,7 @@ class MeanWindow(Window):
         if not inside:
             return None
         count = len(inside)
-        return Mean(sum([sample.value for sample in inside]) / count, self.noise / sqrt(count))
+        return Mean(total([sample.value for sample in inside]) / count, self.noise / sqrt(count))
 
 
 @dataclass

@@ -171,6 +171,14 @@ def test_ticks_are_those_of_python_to_the_bit(monkeypatch):
     assert built == rows()
 
 
+@pytest.mark.parametrize("built", [True, False])
+def test_a_sum_is_made_term_by_term(built, monkeypatch):
+    """In every version of Python: `sum` gives 2 since 3.12."""
+    monkeypatch.setattr(arithmetic, "BUILT", built)
+    assert arithmetic.total([1.0, 1e100, 1.0, -1e100]) == 0.0
+    assert arithmetic.total([]) == 0.0
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

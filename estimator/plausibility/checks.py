@@ -26,5 +26,5 @@ def contradictions(run: Driven, settings: Settings, sources: Sources) -> tuple[C
     timed = found(motion.clock, motion.wrap)
     moved = found(motion.slip) or found(motion.speed)
     placed = found(forces.sinkage, forces.load)
-    pulled = () if moved or placed else found(forces.torque, forces.pull)
+    pulled = () if moved or placed else found(forces.torque) or found(forces.pull)
     return (*timed, *moved, *placed, *pulled)

@@ -45,9 +45,9 @@ class Course:
     driving: Bools  # whether the wheel turns, at more than a start's speed
 
     @property
-    def forward(self) -> float:
-        """1 where the wheel drives forward most of the time, else -1."""
-        return -1.0 if np.count_nonzero(self.rim[self.driving] < 0.0) * 2 > self.count else 1.0
+    def way(self) -> Array:
+        """1 where the wheel turns forward (n,), -1 where it turns backward."""
+        return np.sign(np.nan_to_num(self.rim))
 
     @property
     def count(self) -> int:
@@ -55,10 +55,10 @@ class Course:
 
     @property
     def slip(self) -> Array:
-        """i of the driving windows (m,), along the direction of most of the run."""
-        rim, travel = (self.forward * x[self.driving] for x in (self.rim, self.travel))
+        """i of the driving windows (m,), along the way in which the wheel turns."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            slip = np.where(rim >= travel, 1.0 - travel / rim, rim / travel - 1.0)
+            ratio = self.travel[self.driving] / self.rim[self.driving]
+            slip = np.where(ratio <= 1.0, 1.0 - ratio, 1.0 / ratio - 1.0)
         return np.clip(slip, -1.0, 1.0)
 
 

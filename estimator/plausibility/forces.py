@@ -119,17 +119,49 @@ def load(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
 def torque(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     """Where slip is positive, soil is sheared backward all along the contact (Eq. 6): T > 0."""
     course = run.course
-    torque, slip = course.forward * course.torque[course.driving], course.slip
-    known = np.isfinite(torque) & (slip > FEW)
-    if np.count_nonzero(known) < LEAST:
+    known = course.driving & np.isfinite(course.torque)
+    known[course.driving] &= course.slip > FEW
+    torque = (course.way * course.torque)[known]
+    if torque.size < LEAST:
         return
-    if float(np.mean(torque[known] < 0.0)) > MOST:
-        usual = float(np.median(torque[known]))
+
+    usual = float(np.median(torque))
+    if float(np.mean(torque < 0.0)) > MOST:
         yield told(
             "torque",
             f"torque is {usual:.3g} N·m against the motion of a wheel that slips forward",
             [turned("torque", sources)],
         )
+        return
+    yield from _strength(usual, course, known, settings, sources)
+
+
+def _strength(
+    usual: float, course: Course, known: Bools, settings: Settings, sources: Sources
+) -> Iterator[Contradiction]:
+    """Soil takes c A + tan φ W / cos θ₁ at most, as its bounds are, and hardly a tenth of the least
+    friction only where another unit is meant.
+    """
+    wheel, bounds = settings.wheel, settings.filter
+    load = load_of(course, settings)
+    if load <= settings.load.minimum:
+        return
+    sinkage = np.nan_to_num(course.sinkage[known], nan=wheel.radius)
+    angle = float(np.median(entry_angle(wheel, sinkage)))
+    area = wheel.width * wheel.radius * angle
+    friction = bounds.tan_phi_bounds[1] * load / np.cos(angle)
+    most = wheel.radius * (bounds.cohesion_bounds[1] * area + friction)
+    least = bounds.tan_phi_bounds[0] * load * wheel.radius
+
+    likely = [r.words for r in remedies("torque", sources) if least < usual * r.factor < most]
+    if usual > (1.0 + TOLERANCE) * most:
+        yield told(
+            "strength",
+            f"torque is {usual:.3g} N·m, and soil within filter's bounds takes {most:.3g} N·m",
+            likely or ["the torque, its constant, or the radius is another"],
+        )
+    elif 0.0 < usual < 0.1 * least and likely:
+        yield told("idle", f"torque is {usual:.2g} N·m under {load:.3g} N", likely)
 
 
 def pull(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
@@ -143,13 +175,13 @@ def _falling(course: Course, settings: Settings, sources: Sources) -> Contradict
     slip = np.full(course.pull.size, np.nan)
     slip[course.driving] = course.slip
     turning = bool(np.isfinite(course.torque).any())
-    other = course.forward * course.torque / settings.wheel.radius if turning else slip
+    other = course.way * course.torque / settings.wheel.radius if turning else slip
     known = (slip > 0.0) & np.isfinite(course.pull + other) & (turning | (slip < SMALL))
     if np.count_nonzero(known) < LEAST or (turning and float(np.median(other[known])) <= 0.0):
         return None
 
     load = load_of(course, settings)
-    pull, felt = course.forward * course.pull[known], course.load[known]
+    pull, felt = (course.way * course.pull)[known], course.load[known]
     apart = FEW * load if turning else FEW
     together = _together(pull, other[known], np.nan_to_num(felt, nan=load), apart)
     if together > -CLEAR:
@@ -163,27 +195,32 @@ def _beyond(course: Course, settings: Settings, sources: Sources) -> Contradicti
     """The pull is that of stresses which turn the wheel with the measured torque."""
     known = course.driving & np.isfinite(course.torque + course.pull)
     known[course.driving] &= course.slip > 0.0
-    torque, pull = (course.forward * x[known] for x in (course.torque, course.pull))
+    torque, pull = ((course.way * x)[known] for x in (course.torque, course.pull))
     if pull.size < LEAST or float(np.median(torque)) <= 0.0:
         return None
 
-    load = load_of(course, settings)
-    least, most = _bounds(course, known, settings, torque / settings.wheel.radius)
-    if not (off := _outside(pull, least, most, load)):
+    usual = load_of(course, settings)
+    load = np.nan_to_num(course.load[known], nan=usual)
+    least, most = _bounds(course, known, settings, torque / settings.wheel.radius, load)
+    felt = np.maximum(load, usual)
+    if not (off := _outside(pull, least, most, felt)):
         return None
+    throughout = np.median(np.maximum(least - pull, pull - most)) > 0.0
     likely = [
         remedy.words
         for remedy in remedies("pull", sources)
-        if not _outside(pull * remedy.factor, least, most, load)
+        if throughout
+        and not _outside(pull * remedy.factor, least, most, felt)
+        and np.percentile(np.abs(pull * remedy.factor), 100.0 * MOST) > FEW * usual
     ]
-    if _outside(-pull, least, most, load) < 0.5 * off:
+    if _outside(-pull, least, most, felt) < 0.5 * off:
         likely = [turned("pull", sources)]
     low, high = float(np.median(least)), float(np.median(most))
     allowed = f"{low:.3g} to {high:.3g} N" if np.isfinite(low) else f"{high:.3g} N at most"
     return told(
         "pull",
         f"pull is {np.median(pull):.3g} N, where torque over radius allows {allowed}",
-        likely or ["the torque, its constant, or the radius is another"],
+        likely or ["a zero, the torque's constant, or the radius is another"],
     )
 
 
@@ -200,23 +237,26 @@ def _together(pull: Array, other: Array, load: Array, apart: float) -> float:
     return float(np.mean(np.sign(rise[pairs] * way[pairs])))
 
 
-def _bounds(course: Course, known: Bools, settings: Settings, shear: Array) -> tuple[Array, Array]:
+def _bounds(
+    course: Course, known: Bools, settings: Settings, shear: Array, load: Array
+) -> tuple[Array, Array]:
     """Least and largest pull (m,) [N] of stresses that turn the wheel with this torque; shear:
-    T/r (m,) [N].
+    T/r (m,) [N]; load (m,) [N].
 
-    All stress at one angle θ gives DP = T/(r cos θ) − W tan θ, which falls with θ; the contact
-    lies between 0 and θ₁. Eqs. (8)-(10) are sums of such. A motor's torque holds what the drive
+    All stress at one angle θ gives DP = T/(r cos θ) − W tan θ, and the contact lies between 0
+    and θ₁. Eqs. (8)-(10) are sums of such. A motor's torque holds what the drive
     loses, so nothing is the least.
     """
     if settings.drive.torque_source != "wrench":
         return np.full(shear.size, -np.inf), shear
     sinkage = course.sinkage[known] + 0.5 * datum(settings)
     angle = entry_angle(settings.wheel, np.nan_to_num(sinkage, nan=settings.wheel.radius))
-    return shear / np.cos(angle) - load_of(course, settings) * np.tan(angle), shear
+    deepest = shear / np.cos(angle) - load * np.tan(angle)
+    return np.minimum(deepest, shear), np.maximum(deepest, shear)
 
 
-def _outside(pull: Array, least: Array, most: Array, load: float) -> float:
-    """How far most of the pulls (n,) lie outside their bounds, over the load; 0 within a
+def _outside(pull: Array, least: Array, most: Array, load: Array) -> float:
+    """How far most of the pulls (n,) lie outside their bounds, over the load (n,); 0 within a
     tolerance.
     """
     off = np.maximum(least - pull, pull - most) / load

@@ -11,6 +11,8 @@ LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3}
 ANGLES = {"rad": 1.0, "deg": pi / 180.0, "turn": 2.0 * pi}
 TURNING = {"rad/s": 1.0, "rpm": pi / 30.0, "deg/s": pi / 180.0}
+TORQUES = {"N*m": 1.0, "N*cm": 1e-2, "N*mm": 1e-3}
+CURRENTS = {"A": 1.0, "mA": 1e-3}
 FORCES = {"N": 1.0, "kN": 1e3, "kg": 9.80665, "lbf": 4.4482216}
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
@@ -22,6 +24,9 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "sinkage": LENGTHS,
     "load": FORCES,
     "drawbar_pull": FORCES,
+    "torque": TORQUES,
+    "motor_torque": TORQUES,
+    "current": CURRENTS,
 }
 # channel of a recording, whose raw numbers have no unit -> channels of a map that it may come from
 RECORDED = {
@@ -30,6 +35,7 @@ RECORDED = {
     "sinkage": ("sinkage",),
     "load": ("load",),
     "pull": ("drawbar_pull",),
+    "torque": ("torque", "current"),
 }
 
 

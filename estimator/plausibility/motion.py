@@ -26,6 +26,7 @@ SLOWEST = 3e-4  # [m/s] of a rim: a wheel of the size of a hand needs half an ho
 LONGEST = 2.0  # [s] between two readings: five fill the longest window of the filter
 USUAL = (1e-4, 1.0)  # [s] between the readings of a log
 CHANGE = 500.0  # times: two units of time differ by 1000
+HELD = 0.25  # of the load: soil holds a wheel that skids back by more
 BRAKED, SPINNING = -0.5, 0.85  # slip while driving beyond which a unit is asked after
 RATIO = (0.02, 1.2)  # v / rω of a wheel that drives
 
@@ -135,13 +136,16 @@ def slip(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
 
 def _drives(course: Course, settings: Settings) -> bool:
     """Whether torque or pull are those of a wheel that drives, in a tenth of the windows: one that
-    skids neither pulls nor takes torque.
+    skids takes no torque, and the soil holds it back.
     """
-    least = FEW * load_of(course, settings)
-    forces = (course.torque / settings.wheel.radius, course.pull)
-    driving = [course.forward * force[course.driving] for force in forces]
-    known = [force[np.isfinite(force)] for force in driving]
-    return any(force.size and np.percentile(force, 100.0 * MOST) > least for force in known)
+    load, radius = load_of(course, settings), settings.wheel.radius
+    least = ((course.torque / radius, FEW * load), (course.pull, -HELD * load))
+    for force, above in least:
+        driving = (course.way * force)[course.driving]
+        known = driving[np.isfinite(driving)]
+        if known.size and np.percentile(known, 100.0 * MOST) > above:
+            return True
+    return False
 
 
 def _sheared(course: Course, settings: Settings) -> bool:

@@ -95,6 +95,9 @@ MISTAKES = [
     (SPEEDS, ("load, unit: N", "load, unit: N, factor: 0.102"), "load .*kg"),
     (SPEEDS, ("pull, unit: N", "pull, unit: N, factor: -1"), "pull .*factor: -1 for fx"),
     (SPEEDS, ("torque, unit: N*m", "torque, unit: N*m, factor: -1"), "factor: -1 for M"),
+    (SPEEDS, ("torque, unit: N*m", "torque, unit: N*m, factor: 100"), "torque .*N[*]cm, not N[*]m"),
+    (SPEEDS, ("torque, unit: N*m", "torque, unit: N*mm"), "torque .*N[*]m, not N[*]mm"),
+    ((*ANGLES, "M"), ("unit: mm/s", "unit: cm/s"), "carriage .*mm/s"),
     (SPEEDS, ("position, unit: mm", "position, unit: mm, factor: -1"), "against .*factor: -1"),
     (SPEEDS, ("load: 60 N", "load: 120 N"), "load is 60 N .*120 N as stated"),
 ]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import can
-from cantools.database.can import Signal
-
+from gritd.drivers.can_libraries import Signal, can
 from gritd.drivers.can_link import CanLink, port_of
 from gritd.drivers.can_signals import database
 from gritd.drivers.decoder import Decoder

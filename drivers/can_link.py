@@ -13,8 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-import can
-
+from gritd.drivers.can_libraries import can
 from gritd.drivers.errors import DeviceError
 from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, Accepted, pack
 from gritd.drivers.link import POLL, Chunk, Clock

@@ -8,11 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-import cantools
-from cantools.database import Database
-from cantools.database.can import Message, Signal
-from cantools.database.conversion import BaseConversion
-
+from gritd.drivers.can_libraries import BaseConversion, Database, Message, Signal, cantools
 from gritd.drivers.dbc import MAX_MESSAGE, DbcError, DbcFile
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.estimator.config.settings import Device

@@ -15,9 +15,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from math import isfinite
 
-import cantools
-from cantools.database import Database
-
+from gritd.drivers.can_libraries import Database, cantools
 from gritd.estimator.config.nearest import did_you_mean
 
 MAX_DBC_BYTES = 8 << 20

@@ -21,10 +21,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-import cantools
-from cantools.database import Database
-from cantools.database.can import Message, Signal
-
+from gritd.drivers.can_libraries import Database, Message, Signal, cantools
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing import Counts, FieldValue, Frame, SequenceGap
 

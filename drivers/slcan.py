@@ -14,8 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from can.util import CAN_FD_DLC
-
+from gritd.drivers.can_libraries import CAN_FD_DLC
 from gritd.drivers.framing_can import EXTENDED, REMOTE, pack
 
 LONGEST_LINE = 4096  # [bytes] kept of a line that does not end; a message takes 32

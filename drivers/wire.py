@@ -7,10 +7,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-import can
-from cantools.database.can import Message, Signal
-
 from gritd.drivers import framing_ascii, framing_cobs
+from gritd.drivers.can_libraries import Message, Signal, can
 from gritd.drivers.can_signals import database
 from gritd.drivers.framing import FieldValue, Frame
 from gritd.drivers.framing_can import COUNTERS, DEVICE_TIME

@@ -16,9 +16,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal, Protocol
 
-import can
-
 from gritd.drivers.build import build_decoder, used_devices
+from gritd.drivers.can_libraries import can
 from gritd.drivers.framing import FieldValue
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.config.settings import Channel, Device, Settings, Wrench

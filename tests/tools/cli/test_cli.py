@@ -63,6 +63,21 @@ def test_who_is_refused_by_the_lock_does_not_wait_for_numpy() -> None:
     )
 
 
+def test_what_listens_to_can_does_not_load_the_library_of_its_log_files(tmp_path: Path) -> None:
+    """python-can takes asammdf, and with it pandas, wherever it is installed."""
+    (tmp_path / "asammdf.py").write_text("raise SystemExit('asammdf is loaded')\n")
+    script = (
+        "import gritd.drivers.build, sys; print('can' in sys.modules, 'asammdf' in sys.modules)"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert found.stdout == "True False\n", found.stderr
+
+
 def test_digits_do_not_depend_on_the_number_of_cores() -> None:
     """Linear algebra on several threads adds in another order: one thread, unless the user says
     otherwise.

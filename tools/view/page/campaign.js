@@ -20,6 +20,8 @@ export const campaign = async () => {
 
   byId("campaign-told").textContent = `Dots: windows of the runs, by load. Line: original equations (1) to (10); dashed: closed form (20) to (22); both with ` +
     `the soil that all runs together know, c ${pair(told.soil.cohesion, 0)} Pa, tan φ ${pair(told.soil.tan_phi, 4)}.`;
+  const refused = told.runs.map((run, i) => (run.counts ? "" : `run ${i + 1} is not believed: ${run.reason}`)).filter(Boolean);
+  byId("refused").replaceChildren(...refused.map(words => made("li", `Left out, ${words}.`)));
   const into = byId("forces");
   into.replaceChildren(...FORCES.map(force => drawn(told, ...force)).filter(Boolean), estimates(told, "cohesion", "cohesion c [Pa]", 0),
     estimates(told, "tan_phi", "tan φ", 4));
@@ -33,12 +35,12 @@ const drawn = (told, name, label, symbol, unit) => {
   if (parts.length === 0) return null;
 
   const loads = [...new Set(parts.map(part => Math.round(part.load)))].sort((a, b) => a - b);
-  const groups = grouped(loads);
+  const groups = grouped(loads), tones = toned(told.runs, groups);
   const slips = parts.flatMap(part => part.slip.map(v => 100 * v));
   const forces = parts.flatMap(part => [...part.of.measured, ...part.of.original.value, ...part.of.closed.value]).filter(v => v !== null);
   const {figure, svg, X, Y, words} = axes(span(slips), span(forces), label, "slip [%]");
   for (const part of parts) {
-    const tone = `run-${groups.get(Math.round(part.load)) % COLOURS + 1}`;
+    const tone = `run-${tones.get(groups.get(Math.round(part.load)))}`;
     const dots = part.of.measured.map((v, i) => (v === null ? "" : `M${X(100 * part.slip[i]).toFixed(1)} ${Y(v).toFixed(1)}h0`)).join("");
     picture(svg, "path", {class: `dots ${tone}`, d: dots});
     const curve = (of, kind) => picture(svg, "path", {class: `curve ${tone} ${kind}`, d: path(of.slip.map((s, i) => [X(100 * s), Y(of.value[i])]))});
@@ -46,7 +48,7 @@ const drawn = (told, name, label, symbol, unit) => {
     curve(part.of.closed, "dashed");
   }
   [...new Map(loads.map(load => [groups.get(load), load]))].reverse().forEach(([group, load], i) =>
-    words(`${load} N`, BOX.right - 52 * i, BOX.top - 10, `run-text-${group % COLOURS + 1}`));
+    words(`${load} N`, BOX.right - 52 * i, BOX.top - 10, `run-text-${tones.get(group)}`));
 
   const off = which => {
     const known = parts.filter(part => part.of.off[which] !== null), count = known.reduce((sum, part) => sum + part.slip.length, 0);
@@ -69,6 +71,14 @@ const grouped = loads => {
   return found;
 };
 
+// The colour of each group of loads: that of its first run in the curves above, where every run has one load.
+const toned = (runs, groups) => {
+  const driven = runs.map(run => [...new Set(run.loads.map(load => groups.get(Math.round(load.load))))].filter(group => group !== undefined));
+  const single = driven.every(own => own.length <= 1);
+  return new Map([...new Set(groups.values())].map(group =>
+    [group, (single ? driven.findIndex(own => own.includes(group)) : group) % COLOURS + 1]));
+};
+
 const estimates = (told, name, label, decimals) => {
   // A run that is not believed does not set the scale: its σ may be larger than all others together.
   const believed = told.runs.filter(run => run.counts), of = believed.length ? believed : told.runs;
@@ -87,9 +97,8 @@ const estimates = (told, name, label, decimals) => {
   });
   words("alone", BOX.right - 150, BOX.top - 10, "");
   words("with those before it", BOX.right, BOX.top - 10, "estimate-text");
-  const refused = told.runs.map((run, i) => (run.counts ? "" : `run ${i + 1} is not believed: ${run.reason}`)).filter(Boolean);
   const said = `${label} run by run within 2σ, in the order of the table: ` + told.runs.map((run, i) => `${i + 1} ${run.name}`).join(", ") +
-    `. All together ${pair(told.soil[name], decimals)}.` + (refused.length ? ` Left out: ${refused.join("; ")}.` : "");
+    `. All together ${pair(told.soil[name], decimals)}.`;
   figure.appendChild(made("figcaption", said));
   svg.setAttribute("aria-label", said);
   return figure;

@@ -180,7 +180,7 @@ const listed = () => {
   }));
   byId("runs").hidden = page.runs.length < 2;
   byId("differences").hidden = page.runs.length < 2;
-  const run = active(), day = new Date(run.start * 1000).toISOString().slice(0, 16).replace("T", " ");
+  const run = active(), day = new Date(1000 * Math.ceil(run.start)).toISOString().slice(0, 16).replace("T", " ");
   byId("about").textContent = `${["gritd", run.testbed, run.name, `${day} UTC`, run.operator, run.notes].filter(Boolean).join(" · ")}`;
   document.title = `${run.name} – gritd`;
 };

@@ -145,7 +145,7 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
 
     print(f"log {recording.path}")
     print(
-        f"figure {_drawn(folder, ticks, targets.headline(estimates, plant, ticks), soil)}",
+        f"figures {_drawn(folder, ticks, targets.headline(estimates, plant, ticks), soil)}",
         flush=True,
     )
 
@@ -159,12 +159,13 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
 
 
 def _drawn(folder: Path, ticks: Rows, title: str, soil: Mapping[str, float]) -> str:
-    """The path of the figure, or why there is none."""
+    """The paths of the figures, or why there are none."""
     if how := missing("matplotlib"):
         return f"not drawn: {how}"
-    picture = folder / "demo.png"
+    picture, soil_picture = folder / "demo.png", folder / "soil.png"
     importlib.import_module("gritd.tools.report.figure").draw(picture, ticks, title, soil)
-    return str(picture)
+    importlib.import_module("gritd.tools.report.collapse").draw(soil_picture, ticks, soil)
+    return f"{picture}, {soil_picture}"
 
 
 def _recording(folder: Path) -> Recording:

@@ -69,7 +69,8 @@ def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
     ]
     assert counts[0] == sum(counts[1:]) > 1000
     assert "identical bit for bit" in done.stdout
-    assert (folder / "demo.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    for picture in ("demo.png", "soil.png"):
+        assert (folder / picture).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert not children(folder)
 
 

@@ -1,13 +1,13 @@
 """`python -m gritd.tools.proof.ours.calibrate [--pairs] --out OUT PATH…`: learn how far evidence is
 to be trusted, of campaigns alone or of pairs.
 
-Each PATH is a file of trials (`python -m gritd.tools.proof.ours.trials --out FILE`) or the folder
-of an opened batch of blind trials (`gritd prove --output FOLDER`). The temperature and the odds are
-those that give the truth of every case the largest probability, on average: the logarithmic score,
-which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps
-what few cases do not tell. The truth of a case is any set of effects that holds a true one,
-weighted by how many of its effects are true; of one outside the list, or of a pair in which nothing
-is new, an explanation without names. OUT keeps the other table that it holds.
+Each PATH is the folder of an opened batch of blind trials (`gritd prove --output PATH`). The
+temperature and the odds are those that give the truth of every case the largest probability, on
+average: the logarithmic score, which only stated probabilities that are true maximise (Good 1952).
+A prior (START, PRIOR) keeps what few cases do not tell. The truth of a case is any set of effects
+that holds a true one, weighted by how many of its effects are true; of one outside the list, or of
+a pair in which nothing is new, an explanation without names. OUT keeps the other table that it
+holds.
 """
 
 from __future__ import annotations
@@ -35,8 +35,6 @@ from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 # ln temperature; log odds: listed, more, nameless; logit of the lapse
 START = np.array([np.log(3.0), 1.1, -1.9, 0.0, -3.5])
 PRIOR = 1.0  # standard deviation of each about START
-# where the formula is the diagnosis' own, names come too easily
-LEARNT_FROM = ("cousin", "pair", "unlisted")
 OTHERS = 30  # names among which a lapse spreads
 
 
@@ -114,24 +112,10 @@ def learn(cases: Sequence[Case]) -> tuple[Calibration, float]:
 # ---- where cases come from ---------------------------------------------------------------------
 
 
-def read(path: Path, pairs: bool = False) -> list[Case]:
-    """The cases of a file of trials or a folder of blind trials that alarmed on what another author
-    might have recorded: the others say nothing of names. A campaign alone counts where it alarmed
-    rightly. pairs: those of a folder instead of its campaigns alone.
+def read(folder: Path, pairs: bool = False) -> list[Case]:
+    """The cases of an opened batch that alarmed: the others say nothing of names. A campaign alone
+    counts where it alarmed rightly. pairs: the pairs instead of the campaigns alone.
     """
-    return _batch(path, pairs) if path.is_dir() else _trials(path)
-
-
-def _trials(path: Path) -> list[Case]:
-    every = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    return [
-        case_of(c["weighed"], c["truth"], c["stratum"] == "unlisted", c["candidates"])
-        for c in every
-        if c.get("weighed") and c["stratum"] in LEARNT_FROM
-    ]
-
-
-def _batch(folder: Path, pairs: bool) -> list[Case]:
     cases = []
     for result in sorted(folder.glob("cases/*/result.json")):
         sealed = folder / "answers" / f"{result.parent.name}.json"

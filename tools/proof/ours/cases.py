@@ -67,19 +67,11 @@ class Plan:
     seed: int
 
 
-LACKS = ("runs", "loads", "force")  # of a poor campaign: one run, one load, no force/torque sensor
-
-
-def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
-    """A testbed, a soil inside what is known of it, a schedule; noise of any colour. lack: one of
-    LACKS, or nothing.
-    """
+def draw(settings: Settings, rng: np.random.Generator) -> Plan:
+    """A testbed, a soil inside what is known of it, a schedule; noise of any colour."""
     settings = _known(settings, rng)
-    count = 1 if lack == "runs" else int(rng.integers(4, 8))
+    count = int(rng.integers(4, 8))
     loads = rng.permutation(np.linspace(rng.uniform(30, 45), rng.uniform(80, 110), count))
-    if lack == "loads":
-        loads = np.full(count, float(rng.uniform(45.0, 90.0)))
-
     speed = rng.uniform(0.012, 0.03)
     motions, began = [], 0.0
     for number in range(count):
@@ -94,7 +86,7 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
         float(np.exp(rng.uniform(-0.7, 0.7))),
         float(rng.choice([0.0, 0.1, 0.3])),
         float(rng.choice([0.05, 0.3, 1.0, 3.0])),
-        bool(rng.random() < 0.8) and lack != "force",
+        bool(rng.random() < 0.8),
         _errors(settings, rng),
         tuple(
             (rng.standard_normal() + _set_errors(loads, rng))

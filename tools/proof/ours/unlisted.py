@@ -8,36 +8,10 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength
 from gritd.estimator.stages.situation import Reaction, Sensed, Situation
-from gritd.estimator.terramechanics.soil import Scalar
 
 
 def _size(typical: float) -> float:
     return strength("size", "", typical=typical, low=-1e6, high=1e6)  # type: ignore[no-any-return]
-
-
-@dataclass(frozen=True)
-class BearingFriction(Effect):
-    """A loss that grows with the square of the load."""
-
-    size: float = _size(0.6)
-    stage = "drivetrain"
-    fingerprint = Fingerprint("torque", "load", "")
-
-    def torque_loss(self, situation: Situation) -> Scalar:
-        return self.size * (situation.load / 70.0) ** 2 * np.tanh(situation.wheel_speed / 0.01)
-
-
-@dataclass(frozen=True)
-class HungryPull(Effect):
-    """Drawbar pull lost most at middle slip."""
-
-    size: float = _size(1.5)
-    stage = "testbed"
-    fingerprint = Fingerprint("drawbar_pull", "slip", "")
-
-    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
-        lost = self.size * np.sin(2.0 * np.pi * situation.slip / 0.6) * situation.direction
-        return replace(reaction, drawbar_pull=reaction.drawbar_pull - lost)
 
 
 @dataclass(frozen=True)
@@ -70,32 +44,6 @@ class CableDrag(Effect):
 
 
 @dataclass(frozen=True)
-class SpeedBump(Effect):
-    """A resonance of the drive eats torque about one speed."""
-
-    size: float = _size(0.4)
-    stage = "drivetrain"
-    fingerprint = Fingerprint("torque", "speed", "")
-
-    def torque_loss(self, situation: Situation) -> Scalar:
-        off = (np.abs(situation.wheel_speed) - 0.25) / 0.06
-        return self.size * np.exp(-(off**2))
-
-
-@dataclass(frozen=True)
-class StickySinkage(Effect):
-    """Sinkage reads too large where slip and speed are both high."""
-
-    size: float = _size(2e-3)
-    stage = "testbed"
-    fingerprint = Fingerprint("sinkage", "slip", "")
-
-    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
-        grown = np.maximum(situation.slip - 0.3, 0.0) * np.abs(situation.wheel_speed) / 0.1
-        return replace(reaction, sinkage=reaction.sinkage + self.size * grown)
-
-
-@dataclass(frozen=True)
 class NextDoor(Effect):
     """A machine next door shakes the bed, and the force sensor feels it."""
 
@@ -119,23 +67,3 @@ class RailJoint(Effect):
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
         beyond = 0.5 + 0.5 * np.tanh((situation.position - 0.2) / 0.003)
         return replace(reaction, drawbar_pull=reaction.drawbar_pull - self.size * beyond)
-
-
-@dataclass(frozen=True)
-class SlippedBracket(Effect):
-    """The potentiometer's bracket slips once, in the midst of the campaign."""
-
-    size: float = _size(5e-4)
-    stage = "sensor"
-    fingerprint = Fingerprint("sinkage", "time", "")
-
-    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
-        return replace(
-            sensed, sinkage=sensed.sinkage + self.size * np.heaviside(situation.time - 70.0, 0.0)
-        )
-
-
-UNLISTED: tuple[type[Effect], ...] = (
-    BearingFriction, HungryPull, BentRail, CableDrag, SpeedBump, StickySinkage,
-    NextDoor, RailJoint, SlippedBracket,
-)  # fmt: skip

@@ -84,7 +84,7 @@ def simplest_first(diagnosis: Diagnosis, h: Hypothesis) -> list[Hypothesis]:
 
 
 def _or_alike(group: Sequence[Hypothesis]) -> str:
-    return name_of(group[0].effect) + " or alike" * (len(group) > 1)
+    return name_of(group[0].effect) + " or similar" * (len(group) > 1)
 
 
 def _equals(of: Sequence[Sequence[Hypothesis]]) -> Markup | None:

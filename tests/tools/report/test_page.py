@@ -106,7 +106,7 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
         (
             "explained",
             (
-                "Explained: Coulomb friction or alike",
+                "Explained: Coulomb friction or similar",
                 "Coulomb friction (86 %) or current offset (12 %): not told apart",
                 "98 % probable",
                 "213 nats",
@@ -117,7 +117,7 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
         (
             "several",
             (
-                "Explained: Coulomb friction or alike and soil patch",
+                "Explained: Coulomb friction or similar and soil patch",
                 "cohesion change",
                 "simulated with these 2 effects",
                 "5 more runs",
@@ -317,7 +317,7 @@ def test_of_equals_that_are_not_told_apart_the_simplest_is_named_first() -> None
 
     found = replace(cases.ALL["explained"](), hypotheses=equals)
     said = words(diagnosis.render(found))
-    assert "Explained: Coulomb friction or alike" in said
+    assert "Explained: Coulomb friction or similar" in said
     assert "Coulomb friction (30 %), Stribeck friction (40 %) or wheel inertia (10 %)" in said
 
 

@@ -2,7 +2,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gritd.estimator.recording.mcapfile import Starts
+from gritd.estimator.recording.message_records import Starts
 
 Steps = tuple[tuple[int, int, int], ...]
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import yaml
 
+from gritd.estimator.config.effect_keys import EffectSchema
 from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.config.table import EffectSchema, table
+from gritd.estimator.config.table import table
 from gritd.estimator.config.yamltree import (
     ConfigError,
     Place,

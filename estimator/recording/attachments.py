@@ -12,7 +12,7 @@ from typing import BinaryIO
 from mcap.records import AttachmentIndex
 
 from gritd.estimator.recording.blocks import Damaged, Texts
-from gritd.estimator.recording.mcapfile import RECORD_HEAD
+from gritd.estimator.recording.message_records import RECORD_HEAD
 
 HEAD = 1 << 16  # [bytes] in which name and type of an attachment stand
 STEP = 1 << 20  # [bytes] read at once

@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 
 from gritd.estimator.compiled.records import crc32
 from gritd.estimator.limits import limits
-from gritd.estimator.recording.mcapfile import (
+from gritd.estimator.recording.message_records import (
     MESSAGE_DTYPE,
     MESSAGE_HEAD,
     RECORD_HEAD,

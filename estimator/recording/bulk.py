@@ -9,7 +9,7 @@ from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from gritd.estimator.recording.cdr import BILLION, ENCAPSULATION, Topic
-from gritd.estimator.recording.mcapfile import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD
+from gritd.estimator.recording.message_records import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD
 
 Bytes = NDArray[np.uint8]
 Stamps = NDArray[np.int64]

@@ -13,7 +13,7 @@ import numpy as np
 from mcap.records import Channel, Schema
 
 from gritd.estimator.recording.cdr import Codec, Rows, Topic
-from gritd.estimator.recording.mcapfile import (
+from gritd.estimator.recording.message_records import (
     MESSAGE_DTYPE,
     MESSAGE_HEAD,
     RECORD_HEAD,

@@ -12,7 +12,6 @@ import errno
 import os
 import random
 import stat
-import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -39,28 +38,21 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from numpy.typing import NDArray
 
 from gritd.estimator.recording.chunk_index import ChunkIndexes
+from gritd.estimator.recording.message_records import (
+    MESSAGE_DTYPE,
+    Starts,
+    gather,
+    message_index,
+)
 from gritd.estimator.recording.packing import compressor
 
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
 LIBRARY = "gritd"
 DRAFT = ".new"  # ends the name of a file that is being begun
-RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
-MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
-MESSAGE_DTYPE = np.dtype(
-    {
-        "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
-        "formats": ["<u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
-        "offsets": [0, 1, 9, 11, 15, 23],
-        "itemsize": MESSAGE_HEAD.size,
-    }
-)
-
 Definition = tuple[Schema | None, Channel]
-Starts = NDArray[np.int64]
 
 
 class RecordingError(Exception):
@@ -109,22 +101,6 @@ def sync(fileno: int) -> None:
     except OSError as error:
         if error.errno not in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
             raise
-
-
-def gather(
-    content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]
-) -> NDArray[np.void]:
-    """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy,
-    shape (n,).
-
-    Every record must lie inside: starts + dtype.itemsize <= len(content).
-    """
-    if starts.size == 0:
-        return np.empty(0, dtype)
-
-    room = len(content) - dtype.itemsize + 1
-    windows = np.ndarray((room,), np.dtype((np.void, dtype.itemsize)), content, strides=(1,))
-    return np.asarray(windows[starts]).view(dtype)
 
 
 def record_bytes(*records: McapRecord) -> bytes:
@@ -250,7 +226,7 @@ class McapFile:
         offsets = starts + len(preamble)
         span = int(heads["log_time"].min()), int(heads["log_time"].max())
         chunk = record_bytes(self._chunk(content, span))
-        indexes = [_message_index(channel, heads, offsets) for channel in channels]
+        indexes = [message_index(channel, heads, offsets) for channel in channels]
         lengths = [(channel, len(index)) for channel, index in indexes]
         counts = self._counts + Counter({channel: int(each[channel]) for channel in channels})
         whole = self._span or span
@@ -398,18 +374,3 @@ def _created(draft: Path) -> FileIO:
             raise OSError(errno.EEXIST, f"{draft.name} is there and is no regular file")
         draft.unlink()
     return open(draft, "xb", buffering=0)
-
-
-def _message_index(channel: int, heads: NDArray[np.void], offsets: Starts) -> tuple[int, bytes]:
-    """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the
-    channel.
-    """
-    own = np.flatnonzero(heads["channel"] == channel)
-    pairs = np.empty((own.size, 2), "<u8")
-    pairs[:, 0], pairs[:, 1] = heads["log_time"][own], offsets[own]
-    entries = pairs.tobytes()
-
-    head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
-        "<HI", channel, len(entries)
-    )
-    return channel, head + entries

@@ -24,7 +24,7 @@ from gritd.estimator.limits import limits
 from gritd.estimator.recording.blocks import Block, Unpacker
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.decoding import CDR_LE, PADDING, Chunk, Source, sound
-from gritd.estimator.recording.mcapfile import (
+from gritd.estimator.recording.message_records import (
     MESSAGE_DTYPE,
     MESSAGE_HEAD,
     RECORD_HEAD,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.recording.cdr import ALIASES, BILLION, TIME, Rows
 from gritd.estimator.recording.decoding import CDR_LE, Chunk, Source
-from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, gather
+from gritd.estimator.recording.message_records import MESSAGE_HEAD, gather
 
 Times = NDArray[np.int64]
 MOST = 0.01  # share of the times that may be none

@@ -21,7 +21,8 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.tick import REVISION
 from gritd.estimator.recording.bulk import Bytes, Stamps, merged, records
 from gritd.estimator.recording.cdr import ENCAPSULATION, Topic, Values
-from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError
+from gritd.estimator.recording.message_records import MESSAGE_HEAD, RECORD_HEAD
 from gritd.estimator.recording.metadata import CONFIG, RUN, TICK_REVISION, sealed, versions
 from gritd.estimator.recording.topics import LOG_TOPIC, RAW_TOPICS
 

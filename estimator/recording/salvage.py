@@ -24,14 +24,9 @@ from gritd.estimator.recording.blocks import Block, Damaged, Unpacker, records, 
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.decoding import Chunk, select
 from gritd.estimator.recording.definitions import Definitions
-from gritd.estimator.recording.mcapfile import (
-    LIBRARY,
-    MAGIC,
-    MESSAGE_HEAD,
-    RecordingError,
-    reported,
-)
+from gritd.estimator.recording.mcapfile import LIBRARY, MAGIC, RecordingError, reported
 from gritd.estimator.recording.mcapfile import opened as file_opened
+from gritd.estimator.recording.message_records import MESSAGE_HEAD
 from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
 from gritd.estimator.recording.piles import REACH, ROOM, Pile, alone, opened
 from gritd.estimator.recording.received import LogTimes, received

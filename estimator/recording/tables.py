@@ -17,7 +17,7 @@ import numpy as np
 from gritd.estimator.compiled import records
 from gritd.estimator.recording.cdr import BILLION, TIME, Codec, Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source
-from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, Starts, gather
+from gritd.estimator.recording.message_records import MESSAGE_HEAD, Starts, gather
 
 Fields = tuple[str, ...] | None  # of a topic; None for all of them
 NOTHING: Mapping[str, Fields] = MappingProxyType({})

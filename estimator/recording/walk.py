@@ -19,7 +19,8 @@ from mcap.opcode import Opcode
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.attachments import AttachmentPlace
 from gritd.estimator.recording.blocks import Block, Damaged, Texts
-from gritd.estimator.recording.mcapfile import MAGIC, RECORD_HEAD, RecordingError
+from gritd.estimator.recording.mcapfile import MAGIC, RecordingError
+from gritd.estimator.recording.message_records import RECORD_HEAD
 
 MAX_RUN = 4 << 20  # [bytes] unchunked messages are read in runs of this size
 MAX_DEFINITION = 1 << 20  # [bytes] schema, channel

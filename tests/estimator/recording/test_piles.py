@@ -16,12 +16,8 @@ from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording import piles, salvage
 from gritd.estimator.recording.cdr import Topic
-from gritd.estimator.recording.mcapfile import (
-    MESSAGE_HEAD,
-    RECORD_HEAD,
-    McapFile,
-    RecordingError,
-)
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError
+from gritd.estimator.recording.message_records import MESSAGE_HEAD, RECORD_HEAD
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read

@@ -86,19 +86,24 @@ def test_a_socket_is_never_taken_from_another_daemon(tmp_path, figure):
     figure(SOCKET, WIRES, "wrong answers", (late.stderr != words) + 0.0, "", 0)
 
 
+def talking(wires):
+    """A daemon that says a line ten times a second, into a pipe."""
+    command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
+    return subprocess.Popen(
+        [*command, str(wires.config)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
 def test_nobody_listens_any_more(tmp_path, figure):
     """What it says goes into a pipe whose other end is closed: it runs on, and closes its log when
     it is told to.
     """
-    command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
-        daemon = subprocess.Popen(
-            [*command, str(wires.config)],
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        daemon = talking(wires)
         path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
         daemon.stdout.close()
         wires.play(driven(40.0, 1, skip=1.0))
@@ -114,15 +119,8 @@ def test_somebody_does_not_read(tmp_path, figure):
     """What it says goes into a pipe that is full and stays open: it ends when it is told to, all
     the same.
     """
-    command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
-        daemon = subprocess.Popen(
-            [*command, str(wires.config)],
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        daemon = talking(wires)
         fcntl.fcntl(daemon.stdout, fcntl.F_SETPIPE_SZ, resource.getpagesize())
         path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
         wires.play(driven(40.0, 1, skip=1.0))

@@ -14,13 +14,13 @@ import numpy as np
 
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings, Uncertain
-from gritd.estimator.model.forward import Response, simulate_arrays
+from gritd.estimator.model.forward import Response
 from gritd.estimator.stages.situation import Motion, Sensed, situation_of
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.sensors import readings
-from gritd.tools.testbed.simulation import Run, correction_of, soil_of
+from gritd.tools.testbed.simulation import Run, answered, soil_of
 
 PlantKind = Literal["original", "linear"]
 
@@ -83,16 +83,7 @@ def respond(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion) ->
     """What the wheel does on this soil."""
     if plant == "linear":
         return linear_response(settings, soil, motion)
-
-    constant, acting = settings.drive.torque_constant.value, configured(settings.effects)
-    return simulate_arrays(
-        settings.wheel,
-        soil,
-        motion,
-        acting,
-        torque_constant=constant,
-        correction=correction_of(settings),
-    )
+    return answered(settings, soil, motion, configured(settings.effects))
 
 
 def linear_response(settings: Settings, soil: Soil, motion: Motion) -> Response:

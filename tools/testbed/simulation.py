@@ -30,17 +30,20 @@ def simulate_run(
     settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect], seed: int
 ) -> Run:
     """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
-    constant = settings.drive.torque_constant.value
+    response = answered(settings, soil, motion, acting)
+    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
 
-    response = simulate_arrays(
+
+def answered(settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect]) -> Response:
+    """What the forward model says of a motion."""
+    return simulate_arrays(
         settings.wheel,
         soil,
         motion,
         acting,
-        torque_constant=constant,
+        torque_constant=settings.drive.torque_constant.value,
         correction=correction_of(settings),
     )
-    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
 
 
 def correction_of(settings: Settings) -> Correction | None:

@@ -154,6 +154,11 @@ def test_runs_over_each_other_play_scrub_and_zoom(paths: list[Path], tmp_path: P
             "document.body.dataset.sequence > 0 && document.querySelector('#span').textContent"
         )
         assert tab.value("document.documentElement.scrollWidth") <= 390
+        first = "document.querySelector('#runs tbody th').textContent"
+        named = "document.querySelector('#runs [data-by=name] button').click()"
+        order = [tab.value(f"{named}; {first}") for _ in range(2)]
+        assert len(set(order)) == 2  # ascending, then descending
+
         last = int(tab.value("document.body.dataset.sequence"))
 
         tab.value(SET.format(500, "input", "#scrub"))

@@ -6,10 +6,11 @@ import {plane, wheel} from "./pictures.js";
 import {byId, events as tellEvents, facts, headline, legend, made, table, values} from "./tell.js";
 
 const POINTS = 1200, COLOURS = [1, 2, 3, 4, 5, 6].map(n => `--run-${n}`);
+const MANY = 8; // runs, from which on they can be searched
 const EVERY = 100; // [ms] between moments that are asked for while it plays
 
 const page = {about: null, charts: [], runs: [], active: 0, along: "time", span: null, at: 0, playing: false, speed: 1,
-  events: [], asking: false, wanted: false, before: 0, curves: null, told: null, round: 0};
+  events: [], asking: false, wanted: false, before: 0, curves: null, told: null, round: 0, order: {by: "", down: false}};
 
 const shown = () => page.runs.filter(run => run.shown);
 const active = () => page.runs[page.active];
@@ -160,8 +161,38 @@ const chosen = async number => {
   await load();
 };
 
+// Of a column: numbers by size, what is not known last; words as people sort them.
+const NUMBERS = new Set(["load", "duration", "way", "c", "tan_phi"]);
+const compared = (by, a, b) => {
+  if (!NUMBERS.has(by)) return a[by].localeCompare(b[by], "en", {numeric: true});
+  const [x, y] = [a, b].map(run => parseFloat(run[by]));
+  return Number.isNaN(x) || Number.isNaN(y) ? Number.isNaN(x) - Number.isNaN(y) : x - y;
+};
+
+const inOrder = () => {
+  const {by, down} = page.order, words = byId("filter").value.toLowerCase();
+  const found = page.runs.filter(run => `${run.name} ${run.status} ${run.notes}`.toLowerCase().includes(words));
+  if (by) found.sort((a, b) => (down ? -1 : 1) * compared(by, a, b));
+  return found;
+};
+
+const sortable = () => {
+  for (const head of byId("runs").tHead.querySelectorAll("[data-by]")) {
+    const button = made("button", head.textContent);
+    head.replaceChildren(button);
+    button.addEventListener("click", () => {
+      page.order = {by: head.dataset.by, down: page.order.by === head.dataset.by && !page.order.down};
+      for (const other of byId("runs").tHead.querySelectorAll("[data-by]"))
+        other.ariaSort = other === head ? (page.order.down ? "descending" : "ascending") : "none";
+      listed();
+    });
+  }
+  byId("filter").hidden = page.runs.length < MANY;
+  byId("filter").addEventListener("input", listed);
+};
+
 const listed = () => {
-  byId("runs").tBodies[0].replaceChildren(...page.runs.map(run => {
+  byId("runs").tBodies[0].replaceChildren(...inOrder().map(run => {
     const row = made("tr"), name = made("th"), drawn = made("td"), above = made("td");
     const swatch = name.appendChild(made("i", undefined, "swatch"));
     swatch.style.color = `var(${run.colour})`;
@@ -245,6 +276,7 @@ export const recorded = async about => {
   page.charts = placed(about.charts).map(chart => new Chart(chart, byId("charts"), control));
   legend();
   wire();
+  sortable();
   watched(page.charts, draw);
   page.at = active().duration;
   await chosen(0);

@@ -134,7 +134,7 @@ def play_histories(count, figure):
 
 
 def test_random_histories(figure):
-    play_histories(300, figure)
+    play_histories(150, figure)
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ BEYOND = 0.02  # of the time, without a flag
 LATE = 0.1  # of the cases: an honest σ leaves 5 % outside 2σ at any time
 
 
-@pytest.mark.parametrize("cases", [24, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cases", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_the_soil_changes(cases, figure):
     settings = changes.packaged_rig()
     seeds = range(100_000, 100_000 + cases)
@@ -35,7 +35,7 @@ def test_the_soil_changes(cases, figure):
     figure(CHANGES, level, "cases not back within 2σ in 15 s", 1e2 * late, "%", 1e2 * LATE)
 
 
-@pytest.mark.parametrize("runs", [6, pytest.param(120, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [3, pytest.param(120, marks=pytest.mark.slow)])
 def test_the_soil_stays_the_same(runs, figure):
     settings = changes.packaged_rig()
     seeds = range(100_000, 100_000 + runs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.estimator.config import configuration as config
@@ -33,6 +33,7 @@ TEXT = written(forms.form(3, points=4, directions=2, soil=forms.soil(SOIL, direc
     pull=st.booleans(),
     known=st.booleans(),
 )
+@settings(max_examples=25)
 def test_what_is_written_is_what_is_read(seed, points, directions, pull, known):
     """And again from the effective text."""
     soil = forms.soil(SOIL, directions) if known and directions else None

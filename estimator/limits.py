@@ -29,8 +29,8 @@ class Limits:
     ratio: float = 50  # unpacked to stored, of a recording; of constant readings 15, usually 3
     start: float = 32 * 2**20  # [B] unpacked that the ratio is not asked of
     text: float = 64 * 2**20  # [B] of one file that is imported, unpacked; known logs have 5 MB
-    values: float = 4e6  # of one file that is imported: an hour of 11 columns at 100 Hz
-    series: float = 1e8  # of one text of time series, those that are used: 2.8 h of 10 at 1 kHz
+    values: float = 4e6  # of one text or spreadsheet: an hour of 11 columns at 100 Hz
+    series: float = 1e8  # of one file of time series, those that are used: 2.8 h of 10 at 1 kHz
     conditions: float = 1000  # of a table, each 7 s of a recording; known ones have 189
     ticks: float = 10e6  # built for a recording that has none of its own: 11 h at 250 Hz
     grid: float = 300_000  # points of a recording in a comparison or diagnosis: 8 h at 10 Hz

@@ -47,7 +47,7 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
     segments = [each for each in _segments(path, text, separator) if each.rows]
     if not segments:
         raise RigFileError(f"{path}: found no samples; expected some below {ENDS}")
-    check_size(path, sum(len(each.rows) * len(each.names) for each in segments))
+    check_size(path, sum(len(each.rows) * len(each.names) for each in segments), "values")
     return list(_tables(path, common, segments, decimal, wanted))
 
 

@@ -37,10 +37,12 @@ def reading(path: Path, expected: str) -> Iterator[None]:
         ) from None
 
 
-def check_size(path: Path, values: int) -> None:
-    """Raises RigFileError where a file has more values than a log has."""
-    if values > (most := limits().values):
-        raise RigFileError(f"{path}: found more than {most:g} values; {raised('values')}")
+def check_size(path: Path, values: int, limit: str = "series") -> None:
+    """Raises RigFileError where more values are read than a log has. limit: `series` of numbers in
+    arrays, `values` where each is an object first.
+    """
+    if values > (most := getattr(limits(), limit)):
+        raise RigFileError(f"{path}: found {values} values; expected {most:.0f}; {raised(limit)}")
 
 
 def table(

@@ -27,6 +27,7 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
             f"{path}: found no vector; expected columns of time series; of a table or timetable "
             "save table2struct(T, 'ToScalar', true)"
         )
+    check_size(path, sum(values.size for values in vectors.values()))
     return by_length(path, vectors)
 
 

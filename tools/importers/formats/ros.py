@@ -174,13 +174,19 @@ def _tables(
             _take(topics, message, decoders, wanted)
             if count % STEP == 0:
                 progress.advance(STEP)
-                check_size(path, sum(len(t.logged) * len(t.values) for t in topics.values()))
+                check_size(path, _size(topics))
 
+    check_size(path, _size(topics))
     made = (_table(path, name, topic) for name, topic in topics.items() if topic.logged)
     tables = [each for each in made if each.columns]
     if not tables:
         raise RigFileError(f"{path}: found no messages with numbers; expected some to be mapped")
     return tables
+
+
+def _size(topics: Mapping[str, _Topic]) -> int:
+    """How many numbers are kept."""
+    return sum(len(topic.logged) * len(topic.values) for topic in topics.values())
 
 
 def _take(

@@ -25,7 +25,7 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
     with reading(path, "a spreadsheet"):
         book = import_module("python_calamine").CalamineWorkbook.from_path(path)
         sheets = {name: book.get_sheet_by_name(name) for name in book.sheet_names}
-        check_size(path, sum(sheet.height * sheet.width for sheet in sheets.values()))
+        check_size(path, sum(sheet.height * sheet.width for sheet in sheets.values()), "values")
         rows = {name: sheet.to_python(skip_empty_area=False) for name, sheet in sheets.items()}
 
     tables = [made for name, own in rows.items() for made in _table(path, name, own, wanted)]

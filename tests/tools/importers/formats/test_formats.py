@@ -112,6 +112,18 @@ def test_a_damaged_file_is_one_line(tmp_path: Path, ending: str) -> None:
             assert "\n" not in line and str(bad) in line and error.code in (2, 3), line
 
 
+@pytest.mark.parametrize("ending", [name for name in FORMATS if name != "mf4"])
+def test_more_than_can_be_kept_is_one_line(
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path, ending)
+    monkeypatch.setenv("GRITD_LIMITS", "series=20, values=20")
+    with pytest.raises(CommandError) as error:
+        imported(path, map_of(FORMATS[ending][1], "ns" if ending == "parquet" else "s"))
+    line = str(error.value)
+    assert str(path) in line and "values" in line and "raises the limit" in line
+
+
 @pytest.mark.parametrize("ending", ["7.mat", "tdms", "xlsx", "ulg", "bag", "mf4"])
 def test_a_missing_library_is_named(
     tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch

@@ -27,19 +27,19 @@ def runs_of(files: RunFiles, mapped: SeriesMap, told: Sequence[Told]) -> Iterato
         for (source, path), tell in zip(files.files, told, strict=True)
         for part in parts(path, source, mapped, tell)
     ]
+    yield from runs_of_parts(found, mapped, files.name)
+
+
+def runs_of_parts(found: Sequence[Part], mapped: SeriesMap, name: str) -> Iterator[SeriesRun]:
+    """The same of files that were read. Raises RigFileError."""
     if len(found) == 1:
-        yield from of_table(found[0].table, found[0].mapped, files.name)
+        yield from of_table(found[0].table, found[0].mapped, name)
         return
 
-    each = [
-        list(of_table(part.table, replace(part.mapped, resample=None), files.name))
-        for part in found
-    ]
-    for own in _aligned(each, found, files.name):
+    each = [list(of_table(part.table, replace(part.mapped, resample=None), name)) for part in found]
+    for own in _aligned(each, found, name):
         run = _together(own, found, mapped)
-        run = replace(
-            run, info=replace(info_of(run.table, files.name, mapped), name=own[0].info.name)
-        )
+        run = replace(run, info=replace(info_of(run.table, name, mapped), name=own[0].info.name))
         yield run if mapped.resample is None else resampled(run, mapped.resample)
 
 

@@ -158,6 +158,13 @@ def _complete(run: str, own: Mapping[str, Path], sources: Sequence[MapSource]) -
 def parts(path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = None) -> list[Part]:
     """The columns that a map names of a file, those of one clock together. Raises RigFileError."""
     tables = read(path, Wanted(frozenset(source.columns)), source.columns, told)
+    return parts_of(path, tables, source, mapped)
+
+
+def parts_of(
+    path: Path, tables: Sequence[SeriesTable], source: MapSource, mapped: SeriesMap
+) -> list[Part]:
+    """The same of a file that was read. Raises RigFileError."""
     places = {name: _place(path, tables, name) for name in source.columns}
 
     alike: dict[tuple[int, tuple[str, ...], float | None], list[str]] = {}

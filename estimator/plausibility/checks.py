@@ -24,7 +24,7 @@ def contradictions(run: Driven, settings: Settings, sources: Sources) -> tuple[C
         return tuple(chain.from_iterable(check(run, settings, sources) for check in checks))
 
     timed = found(motion.clock, motion.wrap)
-    moved = found(motion.slip) or found(motion.speed)
+    moved = found(motion.slip) or found(motion.speed) or found(motion.hidden)
     placed = found(forces.sinkage, forces.load)
     pulled = () if moved or placed else found(forces.torque) or found(forces.pull)
     return (*timed, *moved, *placed, *pulled)

@@ -92,6 +92,20 @@ def speed(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contrad
     yield told("fast", f"the rim moves at {rim:.3g} m/s, beyond √(g r) = {fastest:.2g} m/s", likely)
 
 
+def hidden(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+    """A wheel that turns one way in nearly all windows, in none of them faster than its noise."""
+    rim = run.course.rim[np.isfinite(run.course.rim)]
+    if run.course.count or rim.size < 2 * LEAST or abs(np.mean(np.sign(rim))) < MOST:
+        return
+    name = sources["wheel"].name if "wheel" in sources else "wheel"
+    turns = f"the wheel turns at {1e3 * abs(np.median(rim)):.3g} mm/s of its rim"
+    yield told(
+        "hidden",
+        f"{turns}, less than 4σ of its noise",
+        [f"look at {name} for jumps, or state its noise"],
+    )
+
+
 def wrap(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     if run.wrap:
         turns = run.wrap / (2.0 * np.pi)

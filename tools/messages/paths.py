@@ -6,6 +6,7 @@ the `name` of an element is.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -158,5 +159,5 @@ def _fields(value: Any) -> Sequence[str]:
     """The names of a message's fields; none where it is no message."""
     if isinstance(value, dict):
         return [str(name) for name in value]
-    fields = getattr(type(value), "__dataclass_fields__", {})
-    return [name for name in fields if name != "__msgtype__"]
+    fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
+    return [field.name for field in fields]

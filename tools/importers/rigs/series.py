@@ -49,7 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a run, one configuration. Raises RigFileError, ConfigError, RecordingError."""
     if args.guess:
-        tell(guessed(_all(args.paths)).rstrip("\n"))
+        left_out: list[str] = []
+        text = guessed(_all(args.paths, left_out))
+        tell("\n".join([*(f"# {line}" for line in left_out), text.rstrip("\n")]))
         return []
     if args.map is None:
         raise RigFileError("expected --map MAP.yaml, or --guess to propose one", USAGE)
@@ -57,13 +59,16 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         raise RigFileError("expected -o OUTDIR", USAGE)
 
     mapped = load(args.map)
-    runs = _read(runs_files(args.paths, mapped), mapped)
+    left_out = []
+    runs = _read(runs_files(args.paths, mapped, left_out), mapped)
+    for line in left_out:
+        tell(f"note: {line}")
     return _import(runs, mapped, args.config, args.output, tell)
 
 
-def _all(paths: Sequence[Path]) -> list[SeriesTable]:
+def _all(paths: Sequence[Path], left_out: list[str]) -> list[SeriesTable]:
     """Every table of the files. Raises RigFileError."""
-    files = series_files(paths)
+    files = series_files(paths, left_out)
     tables: list[SeriesTable] = []
     with Progress("reading") as progress:
         for path, told in zip(files, _shares(progress, files), strict=True):

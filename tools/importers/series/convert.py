@@ -143,9 +143,10 @@ def _noise(runs: Sequence[SeriesRun], mapped: SeriesMap, name: str) -> float:
     if column.noise is not None:
         return column.noise / column.per_unit
 
+    own = [run.table.column(name) for run in runs]
     each = [
-        scatter(run.seconds, run.table.column(name).numbers, run.table.column(name).resolution)
-        for run in runs
+        scatter(run.seconds, encoders.end_to_end(values.numbers, column), values.resolution)
+        for run, values in zip(runs, own, strict=True)
     ]
     known = [sigma for sigma in each if sigma > 0.0]
     if not known:

@@ -77,8 +77,16 @@ def counted(
     """Counts (n,) of numbers (n,) without gaps. A speed is summed up, over a gap with the mean of
     its ends; what wraps is laid end to end.
     """
-    if column.wraps is not None:
-        numbers = np.unwrap(numbers, period=column.wraps / column.per_unit)
+    numbers = end_to_end(numbers, column)
     if column.channel in SPEEDS:
         return counts(seconds, numbers, quantum)
     return np.round(numbers / quantum).astype(np.int64)
+
+
+def end_to_end(numbers: NDArray[np.float64], column: Mapped) -> NDArray[np.float64]:
+    """The numbers (n,) of a column that wraps as if it did not; NaN in a gap."""
+    if column.wraps is None:
+        return numbers
+    known, laid = np.isfinite(numbers), numbers.copy()
+    laid[known] = np.unwrap(numbers[known], period=column.wraps / column.per_unit)
+    return laid

@@ -28,6 +28,8 @@ WHEEL_LINES = """\
 RATE = "# ? rate: 100 Hz # no time was found: state how many rows a second has"
 GROUPS = (*CHANNELS.values(), *ANALOGUE.values())  # of each, one channel
 BETTER = ("wheel_angle", "wheel_count", "rim_speed", "carriage_position", "carriage_count")
+ELEMENT = re.compile(r"(.*)\[\d+\]")
+MANY = 4  # elements of an array that each get a line
 REASON = 160  # characters of a refusal that are shown
 WORDS_OF_YAML = ("yes", "no", "y", "n", "on", "off", "true", "false", "null")
 
@@ -88,11 +90,12 @@ def guessed(tables: Sequence[SeriesTable]) -> str:
 
     lines = [HEAD + "columns:"]
     for table, used in zip(first, choice.used, strict=True):
+        arrays = _arrays(table, used)
         for name in table.columns:
             if name in used:
                 lines += _lines(_takeable(used[name], choice, tables), choice)
-            else:
-                lines.append(_unused(table, name, proposals, others, refused))
+            elif (more := arrays.get(name, "")) is not None:
+                lines.append(_unused(table, name, proposals, others, refused, more))
 
     lines += ["", RATE] * choice.timeless
     lines += _lacking(choice.taken)
@@ -234,14 +237,32 @@ def _lines(each: Proposal, choice: _Choice) -> Iterator[str]:
         yield f"  #{other} {name}: {{{option.text}}} # {option.why}"
 
 
+def _arrays(table: SeriesTable, used: Mapping[str, Proposal]) -> dict[str, str | None]:
+    """For the elements of long arrays of which none is used: how many are like the first, None for
+    these.
+    """
+    elements: dict[str, list[str]] = {}
+    for name in table.columns:
+        if match := ELEMENT.fullmatch(name):
+            elements.setdefault(match[1], []).append(name)
+
+    found: dict[str, str | None] = {}
+    for names in elements.values():
+        if len(names) > MANY and not used.keys() & set(names):
+            found |= dict.fromkeys(names)
+            found[names[0]] = f" and {len(names) - 1} more of it"
+    return found
+
+
 def _unused(
     table: SeriesTable,
     name: str,
     proposals: Sequence[dict[str, Proposal]],
     others: Sequence[SeriesTable],
     refused: Mapping[str, str],
+    more: str,
 ) -> str:
-    """Why a column is left out."""
+    """Why a column is left out; more: of which others the same is true."""
     why = "not used"
     having = {other.path for other in others if name in other.columns}
     lacking = next((other.path for other in others if other.path not in having), None)
@@ -252,7 +273,7 @@ def _unused(
         why = f"not used, the import would say: {refused[name][:REASON]}"
     elif each is not None:
         why = f"not used, another column is the {each.channel.rstrip('?')}"
-    return f"  # {_quoted(name)}: {why}, {shown(table.columns[name])}"
+    return f"  # {_quoted(name)}{more}: {why}, {shown(table.columns[name])}"
 
 
 def _lacking(taken: dict[str, str]) -> list[str]:

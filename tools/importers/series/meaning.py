@@ -8,14 +8,21 @@ from dataclasses import dataclass
 from gritd.estimator.config import units
 from gritd.tools.importers.series import names
 from gritd.tools.importers.series.columns import SeriesTable
+from gritd.tools.importers.series.encoders import CHANNELS
 from gritd.tools.importers.series.mapping import MEASURED
 
 SI = {name: si for name, (si, _) in MEASURED.items()} | {"time": "s", "nominal_load": "N"}
 RATE = re.compile(r"[_ .]([A-Za-zµ°]+)(?:_per_|_p_|_|p)s(?:ec)?$")  # speed_mm_s, omega_rad_per_s
 ENDING = re.compile(r"[_ .,]+([^\s_,.]*[A-Za-zµμ°%][^\s_,]*)$")
+OF_TOPICS = re.compile(r"\bstate\b")  # says nothing of what a topic holds
+WHOSE = {"wheel", "carriage", "motor", "axle"}
+MOTION = {channel for channels in CHANNELS.values() for channel in channels}
 MESSAGE = re.compile(r"\.(data|value)$")  # of a ROS message that has nothing else
 SIDE = "on which side of the drive it was measured"
 CAPITAL = {"T": "torque?", "M": "torque?", "W": "load", "N": "load", "DP": "drawbar_pull"}
+HEIGHT = (
+    "whether it tells the sinkage; a height that falls: factor: -1, offset: that of the surface"
+)
 FORCE = "load"
 JOINT = {"joint", "joints"}
 AXLE, OTHER_AXES = {"ty", "my", "y"}, {"tx", "mx", "tz", "mz", "x", "z"}
@@ -74,6 +81,7 @@ def meaning_of(name: str, unit: Unit | None) -> Meaning | None:
     if plain in CAPITAL and fits(CAPITAL[plain], unit):
         return Meaning(CAPITAL[plain], 1, SIDE if CAPITAL[plain] == "torque?" else "")
 
+    plain = OF_TOPICS.sub(" ", plain) if plain.startswith("/") else plain
     means, words = names.meanings(plain), set(names.words_of(plain))
     if "other" in means or means == {"number"}:
         return None
@@ -83,6 +91,18 @@ def meaning_of(name: str, unit: Unit | None) -> Meaning | None:
         if meaning is not None and fits(meaning.channel, unit):
             return meaning
     return None
+
+
+def meaning_in(table: SeriesTable, name: str, unit: Unit | None) -> Meaning | None:
+    """Of a column's name without its group, else with it; with it, where that alone says whose
+    motion it is.
+    """
+    short, whole = table.short(name), meaning_of(name, unit)
+    found = meaning_of(short, unit)
+    whose = names.meanings(name) & WHOSE and not names.meanings(short) & WHOSE
+    if found is None or (found.channel in MOTION and whose):
+        return whole or found
+    return found
 
 
 def _kept(bracket: re.Match[str]) -> str:
@@ -144,6 +164,8 @@ def _motion(means: set[str], words: set[str], unit: Unit | None) -> Meaning | No
     speed = bool(means & {"speed", "turning"}) or rate or bool(words & {"v", "vx"})
     if "sinkage" in means and not speed:
         return Meaning("sinkage", 1 if words == {"z"} else 2)
+    if "height" in means and not speed and fits("sinkage", unit):
+        return Meaning("sinkage", 0, HEIGHT)
 
     counts = "counts" in means and (unit is None or unit.name == "count")
     if "wheel" in means:

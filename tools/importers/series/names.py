@@ -80,6 +80,10 @@ WORDS: dict[str, str] = {
         " enfoncement profondeur hundimiento profundidad affondamento sprofondamento profondita"
         " 沉陷 下陷 沉降 深度 沈下 沈み 貫入 深さ"
     ),
+    "height": (
+        "height laser lidar sonar range hohe ~hohe abstand abstand~ ~abstand hauteur altura altezza"
+        " 高さ 高度"
+    ),
     "load": (
         "load fz fn normal vertical weight weights w last"
         " ~last radlast normalkraft aufstands~ auflast"
@@ -100,7 +104,8 @@ WORDS: dict[str, str] = {
         " voltage volt volts spannung ~spannung tension voltaje tensione 电压 電圧 battery batt"
         " akku power leistung ~leistung puissance potencia potenza 功率 電力 pressure druck ~druck"
         " humidity steer steering lenk~ ~lenkung brake throttle pwm duty gear gang yaw roll pitch"
-        " heading lat lon gps imu accel acceleration beschleunigung ~beschleunigung acc gyro cov"
+        " heading orientation quaternion lat lon gps"
+        " imu accel acceleration beschleunigung ~beschleunigung acc gyro cov"
         " covariance radius radial diameter boom bucket error fault status state mode flag"
         " cmd command commanded target setpoint set"
         " desired ref reference soll soll~ ~soll consigne objetivo riferimento 目标 指令 目標"

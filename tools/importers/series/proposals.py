@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gritd.estimator.config import units
 from gritd.estimator.config.names import is_file_name
+from gritd.estimator.plausibility.clock import wrap_of
 from gritd.tools.importers.files import LARGEST, Array
 from gritd.tools.importers.series.columns import Column, SeriesTable
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.mapping import CLOCK, DATE, MEASURED, TIME, Mapped
-from gritd.tools.importers.series.meaning import SI, Meaning, Unit, meaning_of, unit_of
+from gritd.tools.importers.series.meaning import SI, Meaning, Unit, meaning_in, unit_of
 from gritd.tools.importers.series.names import meanings
 from gritd.tools.importers.series.stamps import TimeColumn
 from gritd.tools.importers.series.times import ORDERS, TimeFormatError, likely_unit
@@ -33,6 +35,8 @@ SIGNED = {
     "current": "a current that drives is positive",
     "drawbar_pull": "a pull is positive where the wheel pulls",
 }
+COUNTS = ("wheel_count", "carriage_count")
+NEAR = 0.02  # share of a turn, or of a counter's width, that the last reading before it may lack
 STEADY = 0.01  # noise of an imposed speed that a file of binary numbers does not tell, of its size
 
 
@@ -62,8 +66,7 @@ def proposal(tables: Sequence[SeriesTable], name: str) -> Proposal | None:
     """For a column of the first table; the others are those of the other files."""
     table = tables[0]
     unit = unit_of(table, name)
-    asked = dict.fromkeys((table.short(name), name))
-    meaning = next(filter(None, (meaning_of(each, unit) for each in asked)), None)
+    meaning = meaning_in(table, name, unit)
     if meaning is None:
         return None
     if meaning.channel in (TIME, DATE):
@@ -195,7 +198,7 @@ def _measured(
             return None
         why = f"the same throughout, {known[0][0]:g}"
         return Proposal(name, "nominal_load", meaning.sure, (Option(text, why),))
-    if constant and meaning.channel not in SPEEDS:
+    if constant and (meaning.channel not in SPEEDS or not any(map(np.any, known))):
         return None
     if not constant and meaning.channel == "nominal_load":
         return None
@@ -211,14 +214,28 @@ def _channels(channel: str) -> tuple[str, ...]:
 
 
 def _option(channel: str, column: Column, known: Array, unit: Unit | None) -> Option:
-    guessed = unit is None and channel not in ("wheel_count", "carriage_count")
+    guessed = unit is None and channel not in COUNTS
     likely = _unit(unit, _likely_unit(channel, known))
     text = f"channel: {channel}, unit: {likely}{_factor(unit, '1.0')}"
     if np.ptp(known) == 0.0 and not column.resolution:
         text += f", noise: {STEADY * abs(known[0]) or 1e-3:.3g} {likely}"
+    text += _wraps(
+        channel, known * float(units.unit(likely).factor) * (unit.factor if unit else 1.0)
+    )
     told = f"{SIDES[channel]}; " if channel in SIDES else ""
     how = "unit guessed from the values" if guessed else "unit of the file"
     return Option(text, f"{told}{how}, {_range(known)}")
+
+
+def _wraps(channel: str, turned: Array) -> str:
+    """After what an angle (n,) [rad] or a count begins anew, where it does after a whole turn or a
+    power of two.
+    """
+    wrap = wrap_of(turned)
+    if channel == "wheel_angle" and abs(wrap / (2.0 * np.pi) - 1.0) < NEAR:
+        return ", wraps: 360 deg"
+    whole = float(2.0 ** np.round(np.log2(wrap))) if channel in COUNTS and wrap > 1.0 else 0.0
+    return f", wraps: {whole:.0f} count" if whole and abs(wrap / whole - 1.0) < NEAR else ""
 
 
 def _unit(unit: Unit | None, likely: str) -> str:

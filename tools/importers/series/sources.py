@@ -32,6 +32,7 @@ SERIES = re.compile(
     f"({'|'.join(map(re.escape, (*TEXTS, *registry.ENDINGS)))}){PACKED}", re.IGNORECASE
 )
 ENDING = re.compile(f"({SERIES.pattern.removesuffix(PACKED)})?{PACKED}", re.IGNORECASE)
+FEW = 3  # rows of a table that is one
 SAMPLE = Wanted(rows=100)  # to tell what a file holds
 
 CLOCKS = (DATE, TIME)  # channels that tell when a row was taken
@@ -83,11 +84,28 @@ def stem(name: str) -> str:
 # --- which files ---
 
 
-def series_files(paths: Iterable[Path]) -> list[Path]:
+def series_files(paths: Iterable[Path], left_out: list[str] | None = None) -> list[Path]:
     """The files that are given, and those of the folders that may hold series; the folder of a ROS
-    2 bag counts as a file. Raises RigFileError.
+    2 bag counts as a file. Texts of a folder that are no tables are left out, with a line each.
+    Raises RigFileError.
     """
-    return list(dict.fromkeys(file for path in paths for file in _files(path)))
+    found = list(dict.fromkeys(file for path in paths for file in _files(path)))
+    kept = [path for path in found if path in paths or _may_be_table(path)]
+    if not kept:
+        raise RigFileError(f"{found[0]}: found no table, nor any beside it; expected some", USAGE)
+    if left_out is not None:
+        left_out += [f"{path.name} is no table and left out" for path in found if path not in kept]
+    return kept
+
+
+def _may_be_table(path: Path) -> bool:
+    """Whether a file of a folder is more than a text: one that describes the others."""
+    if path.suffix.lower() not in TEXTS or not path.stat().st_size:
+        return True
+    try:
+        return csv_text.read(path, None, SAMPLE.rows).rows >= FEW
+    except RigFileError:
+        return False
 
 
 def _files(path: Path) -> list[Path]:
@@ -101,9 +119,11 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def runs_files(paths: Sequence[Path], mapped: SeriesMap) -> list[RunFiles]:
-    """The files of each run. Raises RigFileError."""
-    files = series_files(paths)
+def runs_files(
+    paths: Sequence[Path], mapped: SeriesMap, left_out: list[str] | None = None
+) -> list[RunFiles]:
+    """The files of each run; a line for each text that is no table. Raises RigFileError."""
+    files = series_files(paths, left_out)
     (first, *more) = mapped.sources
     if not first.pattern:
         return [RunFiles(stem(path.name), ((first, path),)) for path in files]

@@ -132,6 +132,29 @@ def test_an_angle_that_wraps_is_told_and_can_be_put_right(
     assert complaints(capsys) == []
 
 
+def test_an_angle_that_wraps_to_and_fro_at_rest_drives(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Noise about zero is 0 and 360 by turns, and is no scatter of the angle."""
+    header, *rows = [line.split(",") for line in table.read_text().splitlines()]
+    at, rng = header.index("wheel"), np.random.default_rng(1)
+    first = float(rows[0][at])
+    for row in rows:
+        row[at] = f"{(float(row[at]) - first + 0.02 * rng.standard_normal()) % 360.0:.4f}"
+    (tmp_path / "run.csv").write_text("\n".join(",".join(row) for row in [header, *rows]))
+    said(tmp_path / "run.csv", tmp_path, SPEEDS, ("unit: deg", "unit: deg, wraps: 360 deg"))
+    printed = capsys.readouterr().out
+    assert "cannot be" not in printed and re.search(r"0\.[12]\d … 0\.[45]\d", printed)
+
+
+def test_a_wheel_that_its_noise_hides_is_told(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said(table, tmp_path, SPEEDS, ("unit: deg", "unit: deg, noise: 40 deg"))
+    (line,) = complaints(capsys)
+    assert "noise" in line and "wheel" in line
+
+
 def test_a_time_that_jumps_by_a_thousand_steps_is_told(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -275,3 +275,44 @@ def test_answers_name_the_line_that_they_replace(tmp_path: Path) -> None:
     text, _, asked = proposed(written(tmp_path, names))
     line = next(line for line in text.splitlines() if "channel: torque" in line and "lbf" in line)
     assert names[-1] in asked and "in the place of 'axle torque [Nm]'" in line
+
+
+def test_a_text_of_a_folder_that_is_no_table_is_left_out_and_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    path = written(folder, ["time_s", "wheel rpm", "cart mm/s", "axle torque [Nm]"])
+    (folder / "LIESMICH.txt").write_text("Rad: Durchmesser 144 mm, Breite 71 mm, Last 45 N.\n")
+    assert main(["series", str(folder), "--guess"]) == 0
+    text = capsys.readouterr().out
+    assert "LIESMICH.txt is no table" in text and "{channel: wheel_speed, unit: rpm}" in text
+
+    (tmp_path / "map.yaml").write_text(f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n")
+    out = tmp_path / "out"
+    command = ["series", str(folder), "--map", str(tmp_path / "map.yaml"), "-o", str(out)]
+    assert main(command) == 0 and (out / f"{path.stem}.mcap").exists()
+    assert "LIESMICH.txt is no table" in capsys.readouterr().out
+
+
+def test_what_wraps_and_a_height_are_seen(tmp_path: Path) -> None:
+    turning = [(3.0 * at) % 360.0 for at in range(500)]
+    counts = [float(97 * at % 4096) for at in range(500)]
+    columns = {"t [s]": [at / 50 for at in range(500)], "wheel [deg]": turning}
+    columns |= {"cart counts": counts, "laser [mm]": NOISE * 10}
+    text = guess_of(tmp_path, columns)
+    assert "'wheel [deg]': {channel: wheel_angle, unit: deg, wraps: 360 deg}" in text
+    assert "carriage_count, unit: count, wraps: 4096 count}" in text
+    line = next(line for line in text.splitlines() if "laser" in line)
+    assert "channel: sinkage" in line and "# ?" in line
+
+
+def test_topics_say_whose_a_field_is_and_long_arrays_take_one_line(tmp_path: Path) -> None:
+    rows, rng = 200, np.random.default_rng(1)
+    read_from = {"/drive/state.velocity": rng.normal(0.3, 0.01, rows)}
+    read_from |= {"/odom.x": np.arange(rows) * 1e-3, "/odom.orientation.w": np.ones(rows)}
+    read_from |= {f"/odom.covariance[{at}]": np.zeros(rows) for at in range(36)}
+    np.savez(tmp_path / "run.npz", **read_from)
+    text = guessed(read(tmp_path / "run.npz"))
+    assert "'/drive/state.velocity': {channel: wheel_speed" in text
+    assert "nominal_load" not in text and text.count("covariance") == 1

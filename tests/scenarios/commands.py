@@ -5,7 +5,11 @@ from __future__ import annotations
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 
+from gritd.config import packaged
 from gritd.tools.main import main
+
+AS_PROCESSES = "the commands as processes"  # where a figure was taken
+CONFIG = ("--config", packaged())
 
 
 def in_process(command, *arguments):

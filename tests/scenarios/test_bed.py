@@ -9,16 +9,7 @@ import time
 import pytest
 
 from gritd.estimator.daemon import bed_file
-from tests.scenarios.rig import (
-    TESTBED,
-    WIRES,
-    DaemonProcess,
-    Wires,
-    driven,
-    rows,
-    service,
-    verified,
-)
+from tests.scenarios import rig
 
 BED = "bed file that cannot be, or of another time"
 UPDATES = 20  # more of them in every run; how many more, the computer's load decides
@@ -28,7 +19,7 @@ def run(folder, skip):
     """One run of the daemon until its filter has been updated often; its process, ended. All are
     on one soil, and begin `skip` [s] into the same drive.
     """
-    with service(folder, driven(40.0, 1, skip), bed={"name": "box"}) as (_, daemon):
+    with rig.service(folder, rig.driven(40.0, 1, skip), bed={"name": "box"}) as (_, daemon):
         daemon.wait_status(lambda report: report["tick"] and report["tick"]["updates"] > UPDATES)
         daemon.stop()
     return daemon
@@ -51,12 +42,12 @@ def test_a_run_begins_with_what_the_run_before_it_knows(tmp_path):
     assert after < 0.8 * before
     before, after = (sigma_after(daemon, UPDATES) for daemon in (first, second))
     assert after < before
-    assert verified(first.path()) and verified(second.path())
+    assert rig.verified(first.path()) and rig.verified(second.path())
 
 
 def sigma_after(daemon, updates):
     """σ of tan φ at the first tick with so many updates."""
-    ticks = rows(daemon.path(), "/tick")
+    ticks = rig.rows(daemon.path(), "/tick")
     return ticks["tan_phi_sigma"][ticks["updates"] >= updates][0]
 
 
@@ -77,8 +68,8 @@ def test_every_bed_file_that_cannot_be(tmp_path, figure):
 def check(folder, figure, contents):
     """The run begins with the stated prior, and says so in one line."""
     silent = [n for n, content in enumerate(contents) if not begins_anew(folder / str(n), content)]
-    figure(BED, WIRES, "files", len(contents))
-    figure(BED, WIRES, "not said in one line, or believed", len(silent), limit=0)
+    figure(BED, rig.WIRES, "files", len(contents))
+    figure(BED, rig.WIRES, "not said in one line, or believed", len(silent), limit=0)
 
 
 MONTH = 30 * 86_400.0  # [s]
@@ -110,10 +101,10 @@ def begins_anew(folder, content):
     """
     folder.mkdir()
     bed_file.path_of(folder).write_text(content)
-    with Wires(folder, bed={"name": "box"}) as wires, DaemonProcess(wires.config) as daemon:
+    with rig.Wires(folder, bed={"name": "box"}) as wires, rig.DaemonProcess(wires.config) as daemon:
         daemon.ready()
         daemon.stop()
-    prior = TESTBED.settings.soil.cohesion
+    prior = rig.TESTBED.settings.soil.cohesion
     told = daemon.lines("begins with the stated prior")
-    first = rows(daemon.path(), "/tick")[0]
-    return len(told) == 1 and first["cohesion"] == prior.value and verified(daemon.path())
+    first = rig.rows(daemon.path(), "/tick")[0]
+    return len(told) == 1 and first["cohesion"] == prior.value and rig.verified(daemon.path())

@@ -7,14 +7,13 @@ import shutil
 
 from gritd.config import packaged
 from gritd.drivers.dbc import MAX_DBC_BYTES
-from tests.scenarios.commands import in_process
+from tests.scenarios.commands import AS_PROCESSES, in_process
 from tests.scenarios.hostile import honest, watched
 
 IMPOSSIBLE = "DBC with impossible numbers, a pipe, a device"
 NO_DBC = "a file that is no DBC"
 CUT = "recover of a cut recording"
 WRITABLE = "DBC that others may write"
-OWN = "the commands as processes"
 LONGEST = 300  # characters of a line
 
 WRONG = (  # of SinkagePot and MotorShunt, which are listened to
@@ -63,13 +62,13 @@ def test_a_database_that_cannot_be(tmp_path, figure):
     for name, more in (("8 MiB of signals", signal), ("8 MiB of messages", "BO_ 7 A: 8 X\n")):
         database.write_text(good + "BO_ 6 B: 8 X\n" + more * (room // len(more)))
         done = watched("check-config", config)
-        figure(IMPOSSIBLE, OWN, f"memory, {name}", done.memory, "MB", 100)
+        figure(IMPOSSIBLE, AS_PROCESSES, f"memory, {name}", done.memory, "MB", 100)
 
     database.unlink()
     os.mkfifo(database)
     done = watched("check-config", config)
     assert done.code == 2 and done.one_line, done
-    figure(IMPOSSIBLE, OWN, "processor time, a pipe", done.seconds, "s", 5, real=True)
+    figure(IMPOSSIBLE, AS_PROCESSES, "processor time, a pipe", done.seconds, "s", 5, real=True)
 
 
 def test_what_is_no_database_is_not_quoted(tmp_path, figure):

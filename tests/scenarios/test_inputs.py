@@ -9,13 +9,12 @@ import sys
 
 import pytest
 
-from gritd.config import packaged
 from gritd.drivers.build import used_devices
 from gritd.drivers.wire_log import MAGIC, wire_path
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from tests.estimator.recording.samples import pieces
-from tests.scenarios.commands import in_process
+from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
 from tests.scenarios.conftest import slow
 from tests.scenarios.hostile import shifted, watched
 from tests.scenarios.rig import ROOT, TESTBED, driven
@@ -26,8 +25,6 @@ BYTES = "names and notes that are no UTF-8"
 NESTED = "JSON nested 100,000 deep"
 TIMES = "wire logs of impossible times"
 COLUMNS = "table of 100,000 columns"
-COMMANDS = "the commands as processes"
-CONFIG = ("--config", packaged())
 
 
 def answered(code, said):
@@ -101,8 +98,8 @@ def check_text(folder, figure, texts, locales):
                 faults += [] if answered(code, said) else [(command, locale, code, said[-3:])]
                 tried += 1
     assert not faults, faults
-    figure(BYTES, COMMANDS, "commands", tried)
-    figure(BYTES, COMMANDS, "internal errors", len(faults), limit=0)
+    figure(BYTES, AS_PROCESSES, "commands", tried)
+    figure(BYTES, AS_PROCESSES, "internal errors", len(faults), limit=0)
 
 
 def test_json_of_any_depth(tmp_path, figure):
@@ -151,6 +148,6 @@ def test_a_table_of_many_columns(tmp_path, option, figure):
     done = watched("import", "csv", path, *given, "-o", tmp_path / "out")
     assert done.code in (0, 2, 3) and "internal error" not in done.error, done
     longest = max(map(len, done.error.splitlines()), default=0)
-    figure(COLUMNS, COMMANDS, f"processor time, {option}", done.seconds, "s", 10, real=True)
-    figure(COLUMNS, COMMANDS, f"memory, {option}", done.memory, "MB", 400)
-    figure(COLUMNS, COMMANDS, "characters of the longest error", longest, "", 400)
+    figure(COLUMNS, AS_PROCESSES, f"processor time, {option}", done.seconds, "s", 10, real=True)
+    figure(COLUMNS, AS_PROCESSES, f"memory, {option}", done.memory, "MB", 400)
+    figure(COLUMNS, AS_PROCESSES, "characters of the longest error", longest, "", 400)

@@ -15,7 +15,6 @@ import pytest
 import yaml
 from mcap.records import Metadata
 
-from gritd.config import packaged
 from gritd.estimator.config.configuration import ConfigError, loads
 from gritd.estimator.config.yamltree import dumped
 from gritd.estimator.messages.run_info import RunInfo
@@ -27,7 +26,7 @@ from gritd.tools.commands import recover
 from gritd.tools.commands.check_config import summary
 from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
 from tests.estimator.recording.samples import pieces
-from tests.scenarios.commands import in_process
+from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
 from tests.scenarios.hostile import bomb, honest, later, mcap, record, tiny_chunks, watched
 from tests.scenarios.rig import TESTBED, driven
 
@@ -41,9 +40,6 @@ MOVED = "chunks swapped or duplicated"
 EMPTY = "file of 8 bytes"
 NUMBERS = "metadata and configuration of impossible numbers"
 ADDRESS = "300 and 500 MB of address space"
-OWN = "the commands as processes"
-
-CONFIG = ("--config", packaged())
 
 
 @pytest.mark.parametrize("command", ["replay", "recover", "compare", "diagnose"])
@@ -54,8 +50,8 @@ def test_bomb_inside_the_limits_of_a_chunk(tmp_path, command, chunks, figure):
     done = watched(command, path, *(() if command == "recover" else CONFIG))
     assert done.code == 3 and "unpacks to more than 50 times its size" in done.error + done.out
     assert "internal error" not in done.error
-    figure(BOMB, OWN, "memory", done.memory, "MB", 400)
-    figure(BOMB, OWN, "processor time", done.seconds, "s", 10, real=True)
+    figure(BOMB, AS_PROCESSES, "memory", done.memory, "MB", 400)
+    figure(BOMB, AS_PROCESSES, "processor time", done.seconds, "s", 10, real=True)
 
 
 def test_the_limit_can_be_raised(tmp_path):
@@ -77,8 +73,8 @@ def test_records_that_cost_time_and_hold_nothing(tmp_path, figure):
     for path in sorted(tmp_path.glob("*.mcap")):
         done = watched("recover", path)
         assert done.code == 3 and "the rest is not read" in done.error, done
-        figure(MANY, OWN, "processor time", done.seconds, "s", 10, real=True)
-        figure(MANY, OWN, "memory", done.memory, "MB", 400)
+        figure(MANY, AS_PROCESSES, "processor time", done.seconds, "s", 10, real=True)
+        figure(MANY, AS_PROCESSES, "memory", done.memory, "MB", 400)
         path.unlink()
 
 
@@ -96,8 +92,16 @@ def test_a_reading_much_later(tmp_path, command, gap, figure):
     given = () if name == "recover" else CONFIG
     done = watched(name, path, *given, *((output[0], out) if output else ()))
     assert done.code == 0, done
-    figure(LATER, OWN, "memory", done.memory, "MB", 400)
-    figure(LATER, OWN, "processor time", done.seconds, "s", 10 if name != "diagnose" else 60, True)
+    figure(LATER, AS_PROCESSES, "memory", done.memory, "MB", 400)
+    figure(
+        LATER,
+        AS_PROCESSES,
+        "processor time",
+        done.seconds,
+        "s",
+        10 if name != "diagnose" else 60,
+        True,
+    )
 
 
 def test_a_sparse_file_is_hashed_piece_by_piece(tmp_path, figure):
@@ -107,8 +111,8 @@ def test_a_sparse_file_is_hashed_piece_by_piece(tmp_path, figure):
     os.truncate(path, 9_000_000_000)
     done = watched("compare", path, *CONFIG, bound=4_000_000_000)
     assert done.code == 0, done
-    figure(SPARSE, OWN, "memory", done.memory, "MB", 400)
-    figure(SPARSE, OWN, "processor time", done.seconds, "s", 60, real=True)
+    figure(SPARSE, AS_PROCESSES, "memory", done.memory, "MB", 400)
+    figure(SPARSE, AS_PROCESSES, "processor time", done.seconds, "s", 60, real=True)
 
 
 def test_packed_text(tmp_path, figure):
@@ -123,9 +127,9 @@ def test_packed_text(tmp_path, figure):
                 file.write(unpacked * 2500)
         done = watched("import", "table", folder, "-o", tmp_path / "out")
         assert done.code == 3 and done.one_line, done
-        figure(PACKED, OWN, "packed", (folder / "bomb.csv.gz").stat().st_size / 1e6, "MB")
-        figure(PACKED, OWN, "memory", done.memory, "MB", 400)
-        figure(PACKED, OWN, "processor time", done.seconds, "s", 10, real=True)
+        figure(PACKED, AS_PROCESSES, "packed", (folder / "bomb.csv.gz").stat().st_size / 1e6, "MB")
+        figure(PACKED, AS_PROCESSES, "memory", done.memory, "MB", 400)
+        figure(PACKED, AS_PROCESSES, "processor time", done.seconds, "s", 10, real=True)
 
 
 def test_chunks_in_another_order(tmp_path, figure):
@@ -311,5 +315,5 @@ def test_little_address_space(tmp_path, size, figure):
         fine = done.code == 0 and not math.isnan(done.memory)
         faults += [] if fine or done.one_line else [(command, done)]
     assert not faults, faults
-    figure(ADDRESS, OWN, f"commands that work in {size} MB, of {len(arguments)}", worked)
-    figure(ADDRESS, OWN, "ended otherwise than with one line", len(faults), limit=0)
+    figure(ADDRESS, AS_PROCESSES, f"commands that work in {size} MB, of {len(arguments)}", worked)
+    figure(ADDRESS, AS_PROCESSES, "ended otherwise than with one line", len(faults), limit=0)

@@ -7,10 +7,10 @@ import time
 import pytest
 
 from tests.plugin_package import made, offer, python
+from tests.scenarios.commands import AS_PROCESSES
 from tests.scenarios.conftest import slow
 
 PLUGINS = "plug-in that ends the program, raises, hangs"
-COMMANDS = "the commands as processes"
 OFFERED = (
     ("effects", "second = my_rig.ends", ("effects",)),
     ("effects", "third = my_rig.nowhere:X", ("effects",)),
@@ -41,6 +41,6 @@ def test_plugins_that_are_wrong(tmp_path, offered, figure):
         works = done.returncode == 0 and own in done.stdout if own else done.returncode == 2
         wrong += [] if named and works else [(line, done)]
     assert not wrong, wrong
-    figure(PLUGINS, COMMANDS, "plug-ins", len(offered))
-    figure(PLUGINS, COMMANDS, "not named in one line, or in the way of others", 0, limit=0)
-    figure(PLUGINS, COMMANDS, "longest until then", longest, "s", 15, real=True)
+    figure(PLUGINS, AS_PROCESSES, "plug-ins", len(offered))
+    figure(PLUGINS, AS_PROCESSES, "not named in one line, or in the way of others", 0, limit=0)
+    figure(PLUGINS, AS_PROCESSES, "longest until then", longest, "s", 15, real=True)

@@ -20,6 +20,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.topics import TOPICS
+from tests.scenarios.commands import AS_PROCESSES
 from tests.scenarios.rig import (
     ROOT,
     TESTBED,
@@ -37,7 +38,6 @@ OUTSIDE = "names that lead out of the folder"
 OBSTACLES = "symlinked lock, FIFO, killed parent"
 READABLE = "world-writable configuration, readable recordings"
 SCHEDULER = "hostile worker behind --scheduler"
-COMMANDS = "the commands as processes"
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r\nfake line"
 CONTROL = re.compile(r"[^\S\n ]|[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
@@ -134,8 +134,8 @@ def test_escapes_are_shown_not_sent(tmp_path, figure):
     assert [said[name][0] for name in ("replay", "recover")] == [3, 3]
     assert r"\x1b[2J" in said["status"][1] and r"\x1b[2J" in said["monitor --once"][1]
     assert json.loads(said["status --json"][1])["status"] == EVIL
-    figure(ESCAPES, COMMANDS, "outputs looked at", len(said))
-    figure(ESCAPES, COMMANDS, "control characters sent", sum(map(len, sent.values())), limit=0)
+    figure(ESCAPES, AS_PROCESSES, "outputs looked at", len(said))
+    figure(ESCAPES, AS_PROCESSES, "control characters sent", sum(map(len, sent.values())), limit=0)
 
 
 def refused(code, out, error, expected=(1, 2)):
@@ -179,8 +179,8 @@ def test_names_that_lead_elsewhere(tmp_path, figure):
         leaks += [name] if shown or not refused(*said) else []
     left = files_below(tmp_path) - before - {"secret", "a/b/report.json", "a/b/link"}
     assert left <= {"a/b/.gritd.lock"}, left
-    figure(OUTSIDE, COMMANDS, "names tried", 2 * len(names) + 3)
-    figure(OUTSIDE, COMMANDS, "not refused with one line", len(leaks), limit=0)
+    figure(OUTSIDE, AS_PROCESSES, "names tried", 2 * len(names) + 3)
+    figure(OUTSIDE, AS_PROCESSES, "not refused with one line", len(leaks), limit=0)
 
 
 def test_what_lies_in_the_way(tmp_path, figure):
@@ -214,7 +214,7 @@ def test_what_lies_in_the_way(tmp_path, figure):
     assert all(line.startswith("campaigns: ") for line in error.splitlines())  # a sign of life
     wrong = {name: each for name, each in said.items() if not refused(*each, expected=(1, 2, 3))}
     assert precious.read_bytes() == b"kept" and not wrong, wrong
-    figure(OBSTACLES, COMMANDS, "obstacles not refused with one line", len(wrong), limit=0)
+    figure(OBSTACLES, AS_PROCESSES, "obstacles not refused with one line", len(wrong), limit=0)
 
 
 WORKING = """
@@ -309,5 +309,5 @@ def test_a_scheduler_that_does_not_prove_who_it_is(tmp_path, figure):
                 connections += 1
     wrong = [name for name, end in said.items() if not refused(*end, expected=(2,))]
     assert not wrong and not (tmp_path / "proof").exists(), said
-    figure(SCHEDULER, COMMANDS, "connections to a scheduler over tcp://", connections, limit=0)
-    figure(SCHEDULER, COMMANDS, "not refused with one line", len(wrong), limit=0)
+    figure(SCHEDULER, AS_PROCESSES, "connections to a scheduler over tcp://", connections, limit=0)
+    figure(SCHEDULER, AS_PROCESSES, "not refused with one line", len(wrong), limit=0)

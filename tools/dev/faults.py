@@ -14,86 +14,95 @@ class Fault(NamedTuple):
     name: str
 
 
-FAULTS = (
-    Fault((1,), "device unplugged and back"),
-    Fault((2,), "serial garbage, bad CRC, truncated frame"),
-    Fault((3,), "encoder rollover"),
-    Fault((4,), "encoder counter jump"),
-    Fault((5,), "stuck sensor"),
-    Fault((6,), "NaN, Inf, out of range"),
-    Fault((7,), "wall-clock step"),
-    Fault((8,), "duplicate, late or reordered stamps"),
-    Fault((9,), "CAN error frame or failing bus"),
-    Fault((10,), "hostile CAN or UDP datagram"),
-    Fault((11,), "bus flood"),
-    Fault((12,), "queue overflow"),
-    Fault((13,), "disk full"),
-    Fault((14,), "log folder read-only"),
-    Fault((15,), "kill -9 while logging"),
-    Fault((16,), "power cut while logging"),
-    Fault((17,), "SIGTERM"),
-    Fault((18,), "SIGHUP with bad YAML"),
-    Fault((19,), "YAML bomb, unsafe tag, duplicate key, 1e3 as text, no as false, NaN"),
-    Fault((20,), "hostile or huge recording"),
-    Fault((21,), "recording with flipped bits"),
-    Fault((22,), "wheel in the air"),
-    Fault((23,), "zero slip"),
-    Fault((24,), "negative slip, reverse driving"),
-    Fault((25,), "stall (100 % slip)"),
-    Fault((26,), "θ₁ → 0, f → 0"),
-    Fault((27,), "filter divergence"),
-    Fault((28,), "CPU starvation"),
-    Fault((29,), "a thread dies"),
-    Fault((30,), "garbage-collector pause"),
-    Fault((31,), "second instance"),
-    Fault((32,), "unprivileged user"),
-    Fault((34,), "one wrong stamp of a device clock"),
-    Fault((35,), "step of a device clock"),
-    Fault((36,), "random histories of a device clock"),
-    Fault((37, 69), "wall clock in 1901, 1970, 2040, 2200, 2603"),
-    Fault((38, 39), "step, ramp or patch of the soil"),
-    Fault((40,), "recording that unpacks to a thousand times its size"),
-    Fault((41,), "last reading a day, fifty years later"),
-    Fault((42,), "sparse file of 9 GB, 4 GB of memory"),
-    Fault((43,), "import of packed text"),
-    Fault((44,), "empty attachments, tiny chunks"),
-    Fault((45,), "hostile checkpoints"),
-    Fault((46,), "300 and 500 MB of address space"),
-    Fault((47,), "hostile worker behind --scheduler"),
-    Fault((48,), "terminal escapes in names"),
-    Fault((49,), "names that lead out of the folder"),
-    Fault((50,), "symlinked lock, FIFO, killed parent"),
-    Fault((51,), "world-writable configuration, readable recordings"),
-    Fault((52,), "silence, garbage, counter jumps, a stopped process"),
-    Fault((53,), "second daemon on a socket, too many readers"),
-    Fault((54,), "links and folders named like recordings"),
-    Fault((55,), "ten crashes in a minute"),
-    Fault((56,), "chunks swapped or duplicated"),
-    Fault((57,), "file of 8 bytes"),
-    Fault((58,), "metadata and configuration of impossible numbers"),
-    Fault((59,), "every allocation of the hot path fails once"),
-    Fault((60,), "YAML cut at every byte"),
-    Fault((61,), "encoder silent while its counter wraps"),
-    Fault((61,), "random counter of the wheel"),
-    Fault((61,), "sensor frozen but for its last digit"),
-    Fault((62,), "second daemon on a port of the first"),
-    Fault((63, 64, 65), "plug-in that ends the program, raises, hangs"),
-    Fault((66,), "chunks in reverse order"),
-    Fault((67,), "names and notes that are no UTF-8"),
-    Fault((68,), "JSON nested 100,000 deep"),
-    Fault((70,), "wire logs of impossible times"),
-    Fault((71,), "DBC with impossible numbers, a pipe, a device"),
-    Fault((72,), "write error in the middle of a part"),
-    Fault((73,), "log folder removed during a run"),
-    Fault((74, 75), "bed file that cannot be, or of another time"),
-    Fault((76,), "recovery of the log"),
-    Fault((77,), "recover of a cut recording"),
-    Fault((78,), "DBC that others may write"),
-    Fault((79,), "a file that is no DBC"),
-    Fault((80,), "table of 100,000 columns"),
-    Fault((82,), "two readings in one read of the bus"),
-    Fault((83,), "readings stamped on receipt, 16 to 116 ms late"),
-    Fault((84,), "dask: worker killed, hung, of another version; TLS"),
-    Fault((), "message that cannot be written"),
-    Fault((), "a filter out of its depth"),
-)
+# numbers in the list, - for one that was added since | name
+LISTED = """
+1 | device unplugged and back
+2 | serial garbage, bad CRC, truncated frame
+3 | encoder rollover
+4 | encoder counter jump
+5 | stuck sensor
+6 | NaN, Inf, out of range
+7 | wall-clock step
+8 | duplicate, late or reordered stamps
+9 | CAN error frame or failing bus
+10 | hostile CAN or UDP datagram
+11 | bus flood
+12 | queue overflow
+13 | disk full
+14 | log folder read-only
+15 | kill -9 while logging
+16 | power cut while logging
+17 | SIGTERM
+18 | SIGHUP with bad YAML
+19 | YAML bomb, unsafe tag, duplicate key, 1e3 as text, no as false, NaN
+20 | hostile or huge recording
+21 | recording with flipped bits
+22 | wheel in the air
+23 | zero slip
+24 | negative slip, reverse driving
+25 | stall (100 % slip)
+26 | θ₁ → 0, f → 0
+27 | filter divergence
+28 | CPU starvation
+29 | a thread dies
+30 | garbage-collector pause
+31 | second instance
+32 | unprivileged user
+34 | one wrong stamp of a device clock
+35 | step of a device clock
+36 | random histories of a device clock
+37 69 | wall clock in 1901, 1970, 2040, 2200, 2603
+38 39 | step, ramp or patch of the soil
+40 | recording that unpacks to a thousand times its size
+41 | last reading a day, fifty years later
+42 | sparse file of 9 GB, 4 GB of memory
+43 | import of packed text
+44 | empty attachments, tiny chunks
+45 | hostile checkpoints
+46 | 300 and 500 MB of address space
+47 | hostile worker behind --scheduler
+48 | terminal escapes in names
+49 | names that lead out of the folder
+50 | symlinked lock, FIFO, killed parent
+51 | world-writable configuration, readable recordings
+52 | silence, garbage, counter jumps, a stopped process
+53 | second daemon on a socket, too many readers
+54 | links and folders named like recordings
+55 | ten crashes in a minute
+56 | chunks swapped or duplicated
+57 | file of 8 bytes
+58 | metadata and configuration of impossible numbers
+59 | every allocation of the hot path fails once
+60 | YAML cut at every byte
+61 | encoder silent while its counter wraps
+61 | random counter of the wheel
+61 | sensor frozen but for its last digit
+62 | second daemon on a port of the first
+63 64 65 | plug-in that ends the program, raises, hangs
+66 | chunks in reverse order
+67 | names and notes that are no UTF-8
+68 | JSON nested 100,000 deep
+70 | wire logs of impossible times
+71 | DBC with impossible numbers, a pipe, a device
+72 | write error in the middle of a part
+73 | log folder removed during a run
+74 75 | bed file that cannot be, or of another time
+76 | recovery of the log
+77 | recover of a cut recording
+78 | DBC that others may write
+79 | a file that is no DBC
+80 | table of 100,000 columns
+82 | two readings in one read of the bus
+83 | readings stamped on receipt, 16 to 116 ms late
+84 | dask: worker killed, hung, of another version; TLS
+- | message that cannot be written
+- | a filter out of its depth
+"""
+
+
+def _listed(line: str) -> Fault:
+    rows, name = line.split(" | ")
+    return Fault(tuple(map(int, rows.replace("-", "").split())), name)
+
+
+FAULTS = tuple(map(_listed, LISTED.strip().splitlines()))

@@ -243,7 +243,7 @@ def _arrays(table: SeriesTable, used: Mapping[str, Proposal]) -> dict[str, str |
     """
     elements: dict[str, list[str]] = {}
     for name in table.columns:
-        if match := ELEMENT.fullmatch(name):
+        if name.endswith("]") and (match := ELEMENT.fullmatch(name)):
             elements.setdefault(match[1], []).append(name)
 
     found: dict[str, str | None] = {}

@@ -97,8 +97,10 @@ def meaning_in(table: SeriesTable, name: str, unit: Unit | None) -> Meaning | No
     """Of a column's name without its group, else with it; with it, where that alone says whose
     motion it is.
     """
-    short, whole = table.short(name), meaning_of(name, unit)
-    found = meaning_of(short, unit)
+    found, short = meaning_of(table.short(name), unit), table.short(name)
+    if short == name:
+        return found
+    whole = meaning_of(name, unit)
     whose = names.meanings(name) & WHOSE and not names.meanings(short) & WHOSE
     if found is None or (found.channel in MOTION and whose):
         return whole or found

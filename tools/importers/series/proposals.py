@@ -83,10 +83,15 @@ def proposal(tables: Sequence[SeriesTable], name: str) -> Proposal | None:
 def even(table: SeriesTable) -> Proposal | None:
     """A column without a known name that rises evenly, as a time does and a row's number."""
     for name, column in table.columns.items():
-        known, unit = column.numbers, unit_of(table, name)
-        if column.words is not None or known.size < 3 or not np.isfinite(known).all():
+        known = column.numbers
+        if column.words is not None or known.size < 3 or not known[-1] > known[0]:
             continue
-        if meanings(name) or (unit is not None and unit.name not in ("s", "ms", "us", "ns")):
+        unit = unit_of(table, name)
+        if (
+            not np.isfinite(known).all()
+            or meanings(name)
+            or (unit is not None and unit.name not in ("s", "ms", "us", "ns"))
+        ):
             continue
         steps = np.diff(known)
         usual = float(np.median(steps))

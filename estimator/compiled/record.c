@@ -18,6 +18,7 @@ typedef struct {
     double *best, *sigma, *scale, *x; /* (d,) */
     double *shared, *V;           /* (d, 3) sums from a stretch to the last */
     double spread[STATES];
+    double own;                   /* error of a stretch alone, in shares of the load */
     double *block;                /* that all of these lie in */
 } record;
 
@@ -47,7 +48,7 @@ static int room(record *r) {
 static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     const Py_ssize_t d = r->d;
     double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
-    double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS];
+    double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS], share[COMPONENTS];
     if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 ||
         !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
         PyErr_SetString(PyExc_ValueError, "expected a line of y, H, R, D and shares");
@@ -61,8 +62,11 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) ||
         !read_matrix(PyTuple_GET_ITEM(line, 1), m, d, d, A) ||
         !read_matrix(PyTuple_GET_ITEM(line, 2), m, m, COMPONENTS, &R[0][0]) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &D[0][0]))
+        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &D[0][0]) ||
+        !read_vector(PyTuple_GET_ITEM(line, 4), m, share))
         return 0;
+    for (Py_ssize_t n = 0; n < m; n++)
+        D[n][n] = D[n][n] + (r->own * share[n]) * (r->own * share[n]);
 
     const double first = sqrt(R[0][0] / windows + D[0][0]);
     for (Py_ssize_t n = 0; n < d; n++) A[n] = A[n] / first;
@@ -206,20 +210,21 @@ static void since(record *r, double *evidence) {
 }
 
 PyDoc_STRVAR(evidence_doc,
-"evidence(x, P, spread, lines, windows)\n--\n\nSee filter/evidence.py.");
+"evidence(x, P, spread, lines, windows, own)\n--\n\nSee filter/evidence.py.");
 
 static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t count) {
     (void)module;
     record r = {0};
     PyObject *factors = NULL, *x = NULL, *all = NULL;
-    if (count != 5 || !PyTuple_Check(given[0]) || !PyList_Check(given[3]) ||
+    if (count != 6 || !PyTuple_Check(given[0]) || !PyList_Check(given[3]) ||
         !PyList_Check(given[4]) || PyList_GET_SIZE(given[3]) != PyList_GET_SIZE(given[4])) {
-        PyErr_SetString(PyExc_TypeError, "expected an estimate, a spread and two lists of one length");
+        PyErr_SetString(PyExc_TypeError, "expected an estimate, a spread, two lists of one length, and a share");
         return NULL;
     }
     r.s = PyList_GET_SIZE(given[3]);
     r.d = PyTuple_GET_SIZE(given[0]);
-    if (!room(&r)) return NULL;
+    r.own = PyFloat_AsDouble(given[5]);
+    if ((r.own == -1.0 && PyErr_Occurred()) || !room(&r)) return NULL;
     double *factor = PyMem_Calloc((size_t)r.s + 1, sizeof(double));
     if (factor != NULL && r.d >= STATES && read_vector(given[0], r.d, r.x) &&
         read_vector(given[2], STATES, r.spread) && read_lines(&r, given[3], given[4]) &&

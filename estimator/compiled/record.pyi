@@ -7,5 +7,6 @@ def evidence(
     spread: Vector,
     lines: list[Line],
     windows: list[int],
+    own: float,
     /,
 ) -> tuple[Vector, Vector]: ...

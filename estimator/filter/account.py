@@ -96,7 +96,11 @@ def predictions(measurement: Measurement, account: Account) -> Predictions:
 
     now, estimate = account.now, account.estimate
     prediction = measurement.predict(estimate, now)
-    torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(estimate, now, prediction)
+    shared = measurement.shared(now, prediction)
+    torque, pull = measurement.expected(estimate, prediction, shared)
+    torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(
+        estimate, now, prediction, shared
+    )
     load = measurement.model.load(
         *soil(estimate),
         _with_sigma(now),
@@ -104,7 +108,6 @@ def predictions(measurement: Measurement, account: Account) -> Predictions:
         now.slip.value,
         measurement.form_of(estimate),
     )
-    torque, pull = measurement.expected(estimate, now, prediction)
     return Predictions(
         torque_predicted=torque,
         torque_predicted_sigma=torque_sigma,

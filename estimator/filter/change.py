@@ -39,18 +39,20 @@ def judge(
     spread: Vector,
     lines: Sequence[Line],
     windows: Sequence[int],
+    own: float = 0.0,
 ) -> Judgement:
     """One soil against a change of it.
 
     before: what is known ahead of the first line; spread (3,): σ of a change of the soil; lines (s)
-    and how many windows each is the mean of.
+    and how many windows each is the mean of; own: the error that each has of its own, in shares of
+    the load.
     """
     if arithmetic.BUILT:
         factors, x = arithmetic.evidence(
-            before.x, before.packed, spread, list(lines), list(windows)
+            before.x, before.packed, spread, list(lines), list(windows), own
         )
     else:
-        factors, x = evidence(before, spread, lines, windows)
+        factors, x = evidence(before, spread, lines, windows, own)
 
     return Judgement(np.array(factors), _change(factors), x)
 

@@ -27,8 +27,7 @@ KPA = 1e3  # [Pa]; cohesion is scaled so that all three states are of order one
 
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, ...]
-_DOUBLE = Struct("d")
-_SIZE = _DOUBLE.size
+_SIZE = 8  # [bytes] of a double
 
 
 class Estimate(NamedTuple):
@@ -80,11 +79,11 @@ def rows(matrix: Array) -> Matrix:
 
 def predict(estimate: Estimate, walk: Vector) -> Estimate:
     """Random walk of the soil: add the variances `walk` (3,) to the diagonal of P."""
-    packed, step = bytearray(estimate.packed), (len(estimate.x) + 1) * _SIZE
+    packed = bytearray(estimate.packed)
+    P, step = memoryview(packed).cast("d"), len(estimate.x) + 1
     for state, more in enumerate(walk):
-        (value,) = _DOUBLE.unpack_from(packed, state * step)
-        _DOUBLE.pack_into(packed, state * step, value + more)
-    return estimate._replace(packed=bytes(packed))
+        P[state * step] += more
+    return Estimate(estimate.x, bytes(packed), estimate.log_evidence)
 
 
 def variance(estimate: Estimate, h: Vector) -> float:

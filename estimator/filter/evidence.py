@@ -24,11 +24,12 @@ def evidence(
     spread: Vector,
     lines: Sequence[Line],
     windows: Sequence[int],
+    own: float,
 ) -> tuple[Vector, Vector]:
     """ln of the Bayes factors of a change before each of s stretches (s,), and the vector (d,) that
     fits best if nothing changed. Arguments are those of `change.judge`.
     """
-    A, y = _whitened(lines, windows)
+    A, y = _whitened(lines, windows, own)
     # accumulated: along the last axis `reduce` would add in pairs
     y = y - np.add.accumulate(A * np.array(before.x), axis=2)[..., -1]
     root = _root(before)
@@ -52,11 +53,13 @@ def evidence(
     return _bayes(information - explained, score), tuple(x)
 
 
-def _whitened(lines: Sequence[Line], windows: Sequence[int]) -> tuple[Array, Array]:
+def _whitened(lines: Sequence[Line], windows: Sequence[int], own: float) -> tuple[Array, Array]:
     """H (s, 2, d) and y (s, 2) of unit noise; zeros for a component that is not measured."""
-    y, H, R, D = (
-        np.array(column) for column in zip(*[_full(line)[:4] for line in lines], strict=True)
+    y, H, R, D, share = (
+        np.array(column) for column in zip(*[_full(line) for line in lines], strict=True)
     )
+    for at in range(2):
+        D[:, at, at] = D[:, at, at] + (own * share[:, at]) * (own * share[:, at])
     noise = R / np.array(windows, float)[:, None, None] + D
     columns = np.concatenate((H, y[:, :, None]), axis=2)
 

@@ -41,6 +41,9 @@ def prior() -> Array:
 
 def _hats(nodes: Vector, x: float) -> Vector:
     """Linear interpolation: weight of each node at x, which is held inside."""
-    x = min(max(x, nodes[0]), nodes[-1])
-    step = nodes[1] - nodes[0]
-    return tuple([max(0.0, 1.0 - abs(x - node) / step) for node in nodes])
+    step, last = nodes[1] - nodes[0], len(nodes) - 2
+    along = min(max((x - nodes[0]) / step, 0.0), last + 1.0)
+    at = min(int(along), last)
+    weights = [0.0] * len(nodes)
+    weights[at], weights[at + 1] = at + 1.0 - along, along - at
+    return tuple(weights)

@@ -27,23 +27,17 @@ class Line(NamedTuple):
         """The mean of so many windows as a measurement, about the vector x (d,)."""
         return Update(self.innovation(x), self.H, self.noise(windows))
 
-    def noise(self, windows: int) -> Matrix:
-        """Covariance (m, m) of the mean of so many windows."""
-        return tuple(
-            [
-                tuple([r / windows + d for r, d in zip(rs, ds, strict=True)])
-                for rs, ds in zip(self.R, self.D, strict=True)
-            ]
-        )
-
-    def missed(self, size: float) -> Line:
-        """With an error of this stretch alone, independent for each component, in shares of the
-        load.
+    def noise(self, windows: int, own: float = 0.0) -> Matrix:
+        """Covariance (m, m) of the mean of so many windows; own: the error of this stretch alone,
+        independent for each component, in shares of the load.
         """
-        D = [list(row) for row in self.D]
+        noise = [
+            [r / windows + d for r, d in zip(rs, ds, strict=True)]
+            for rs, ds in zip(self.R, self.D, strict=True)
+        ]
         for at, share in enumerate(self.share):
-            D[at][at] += (size * share) ** 2
-        return self._replace(D=tuple(map(tuple, D)))
+            noise[at][at] += (own * share) ** 2
+        return tuple([tuple(row) for row in noise])
 
     def mixed(self, other: Line, weight: float) -> Line:
         """The mean of two, `weight` on the other."""
@@ -66,7 +60,7 @@ def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
         hypot(quantity.by_slip * mean.doubts[0], quantity.by_load * mean.doubts[1])
         for quantity in prediction[:2]
     ]
-    narrowing = mean.odometry.narrowing if mean.odometry else 1.0
+    narrowing = mean.odometry.slopes[2] if mean.odometry else 1.0
     shared = [quantity.by_slip * mean.grain * narrowing for quantity in prediction[:2]]
     kept = measurement.kept(mean)
     lasting = _lasting([own[at] for at in kept], [shared[at] for at in kept])

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import isnan, sqrt
 from operator import mul
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +45,14 @@ from gritd.estimator.wheel.wheel_state import WheelState, wheel_state, wheeling
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
 Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
+
+
+class Shared(NamedTuple):
+    """A linearised prediction, and its gradients by the errors that all windows share."""
+
+    sensitivity: Sensitivity
+    torque: Vector  # (q,)
+    pull: Vector  # (q,)
 
 
 class Measurement:
@@ -135,17 +144,21 @@ class Measurement:
         """T, DP and resistance of the equations at the estimate, in this window's geometry."""
         return self._predicted(self.model, estimate, now)
 
+    def shared(self, now: WheelState, prediction: Prediction) -> Shared:
+        """How a prediction follows the errors that all windows share."""
+        sensitivity = _sensitivity(now, prediction)
+        return Shared(sensitivity, *self._shared_gradients(sensitivity, now))
+
     def expected(
-        self, estimate: Estimate, now: WheelState, prediction: Prediction
+        self, estimate: Estimate, prediction: Prediction, shared: Shared
     ) -> tuple[float, float]:
         """T [N·m] and DP [N] as the sensors should read them: the prediction, and the errors that
         all windows share.
         """
-        torque, pull = self._shared_gradients(_sensitivity(now, prediction), now)
         x = self._without_stresses(estimate.x)
         return (
-            prediction.torque.value + dot(torque, x),
-            prediction.drawbar_pull.value + dot(pull, x),
+            prediction.torque.value + dot(shared.torque, x),
+            prediction.drawbar_pull.value + dot(shared.pull, x),
         )
 
     def form_of(self, estimate: Estimate) -> FormError:
@@ -177,8 +190,7 @@ class Measurement:
     def linearise(self, now: WheelState, prediction: Prediction, estimate: Estimate) -> Update:
         """Innovation, H and R of the components that are measured."""
         torque, pull = prediction.torque, prediction.drawbar_pull
-        sensitivity = _sensitivity(now, prediction)
-        by_torque, by_pull = self._shared_gradients(sensitivity, now)
+        sensitivity, by_torque, by_pull = self.shared(now, prediction)
         x = self._without_stresses(estimate.x)
 
         update = Update(
@@ -243,11 +255,10 @@ class Measurement:
         return noise if now.form is None else _plus_rest(noise, _rest(now.form, s), self._lasting)
 
     def sigmas(
-        self, estimate: Estimate, now: WheelState, prediction: Prediction
+        self, estimate: Estimate, now: WheelState, prediction: Prediction, shared: Shared
     ) -> tuple[float, float, float]:
         """σ of T, DP and resistance predicted: of the estimate, and of this window's z, i and W."""
-        sensitivity = _sensitivity(now, prediction)
-        torque, pull = self._shared_gradients(sensitivity, now)
+        sensitivity, torque, pull = shared
         of_torque, of_pull = _rest(now.form, sensitivity) if now.form is not None else ((), ())
         no_sensor = (0.0,) * len(torque)
 

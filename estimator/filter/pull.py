@@ -46,7 +46,8 @@ def search_on(measurement: Measurement, search: Search, known: Pull) -> tuple[Se
         return search._replace(pulls=(*search.pulls, prediction.drawbar_pull.value)), known
     best = best_slip(search.pulls)
     there, prediction = _at(measurement, search, best)
-    _, sigma, _ = measurement.sigmas(search.estimate, there, prediction)
+    shared = measurement.shared(there, prediction)
+    _, sigma, _ = measurement.sigmas(search.estimate, there, prediction, shared)
     return None, Pull(prediction.drawbar_pull.value, sigma, best)
 
 

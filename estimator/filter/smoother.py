@@ -80,11 +80,9 @@ class Smoother:
             return None
         first = memory.stretches[memory.since]
         before = (memory.anchor if first.changed is None else first.changed)[leading(bank)]
-        lines = [
-            stretch.line.missed(FORM.usual) for stretch in complete if stretch.line is not None
-        ]
+        lines = [stretch.line for stretch in complete if stretch.line is not None]
         windows = [stretch.windows for stretch in complete]
-        return judge(before, self._doubted(doubt), lines, windows)
+        return judge(before, self._doubted(doubt), lines, windows, FORM.usual)
 
     def tangents(self, stretches: Sequence[Stretch], x: Vector) -> tuple[Line, ...]:
         """Stretches along the tangents at x (3,)."""
@@ -114,7 +112,7 @@ class Smoother:
 
         line = stretch.line
         assert line is not None
-        noises = {size: line.missed(size).noise(stretch.windows) for size in set(FORM.own)}
+        noises = {size: line.noise(stretch.windows, size) for size in set(FORM.own)}
         after = []
         for member, size in zip(bank, FORM.own, strict=True):
             update = Update(line.innovation(member.x), line.H, noises[size])

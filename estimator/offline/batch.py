@@ -204,9 +204,9 @@ def _predictions(tracker: Tracker, account: Account) -> PointPredictions:
     if not account.touching:
         return PointPredictions()
 
-    measurement = tracker.measurement
-    prediction = measurement.predict(account.estimate, account.now)
-    torque, pull = measurement.expected(account.estimate, account.now, prediction)
+    measurement, estimate, now = tracker.measurement, account.estimate, account.now
+    prediction = measurement.predict(estimate, now)
+    torque, pull = measurement.expected(estimate, prediction, measurement.shared(now, prediction))
     return PointPredictions(
         torque_predicted=torque,
         drawbar_pull_predicted=pull,

@@ -27,8 +27,12 @@ class Piece(NamedTuple):
         """With those that follow."""
         windows = self.windows + after.windows
         share = after.windows / windows
-        means = [a + (b - a) * share for a, b in zip(self[1:], after[1:], strict=True)]
-        return Piece(windows, *means)
+        return Piece(
+            windows,
+            self.time + (after.time - self.time) * share,
+            self.rim + (after.rim - self.rim) * share,
+            self.travel + (after.travel - self.travel) * share,
+        )
 
 
 class Sums(NamedTuple):
@@ -40,7 +44,11 @@ class Sums(NamedTuple):
 
     def plus(self, other: Sums) -> Sums:
         """Of both."""
-        return Sums(*[a + b for a, b in zip(self, other, strict=True)])
+        return Sums(
+            self.spread + other.spread,
+            self.by_rim + other.by_rim,
+            self.by_travel + other.by_travel,
+        )
 
 
 class Past(NamedTuple):
@@ -52,7 +60,9 @@ class Past(NamedTuple):
 
     def plus(self, other: Past) -> Past:
         """Of both."""
-        return Past(*[a + b for a, b in zip(self, other, strict=True)])
+        return Past(
+            self.rim + other.rim, self.travel + other.travel, self.variance + other.variance
+        )
 
 
 class Odometry(NamedTuple):
@@ -67,15 +77,16 @@ class Odometry(NamedTuple):
     undone: tuple[float, float]  # [m/s] mean of what effects add to both speeds
 
     @property
-    def speeds(self) -> tuple[float, float]:
-        """rω and v [m/s], effects accounted for."""
+    def slopes(self) -> tuple[float, float, float]:
+        """rω and v [m/s], effects accounted for, and σ of each over that of the mean of the
+        windows' speeds, 0 … 1.
+        """
         whole, (rim, travel) = self._whole, self.undone
-        return whole.rim / self.windows + rim, whole.travel / self.windows + travel
-
-    @property
-    def narrowing(self) -> float:
-        """σ of a speed over that of the mean of the windows' speeds, 0 … 1."""
-        return sqrt(self.length**3 / 12.0 * self._whole.variance / self.windows)
+        return (
+            whole.rim / self.windows + rim,
+            whole.travel / self.windows + travel,
+            sqrt(self.length**3 / 12.0 * whole.variance / self.windows),
+        )
 
     @property
     def _whole(self) -> Past:

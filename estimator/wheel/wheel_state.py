@@ -286,7 +286,7 @@ def steady_since(before: Steady | None, now: WheelState, snapshot: Snapshot) -> 
     if before.last is None:
         return before._replace(last=now)
 
-    if not alike(with_slip_of(before.last, now), before.state):
+    if not alike(before.last, before.state, _slip_of_both(before.last, now)):
         return begun
     return before._replace(state=with_slip_of(before.state, before.last), last=now)
 
@@ -301,20 +301,34 @@ def with_slip_of(state: WheelState, after: WheelState) -> WheelState:
     if state.odometry is None or after.odometry is None:
         return state
     both = state.odometry.joined(after.odometry)
-    slip = slip_over(both, after)
-    own = slip._replace(sigma=slip.sigma / sqrt(both.windows))
-    return state._replace(odometry=both, slip=own)
+    return state._replace(odometry=both, slip=_own_slip(both, after))
 
 
-def alike(now: WheelState, before: WheelState) -> bool:
-    """Whether slip, speed, load and sinkage of two windows agree."""
+def _slip_of_both(state: WheelState, after: WheelState) -> Measured:
+    """Slip of a window and a later one together."""
+    if state.odometry is None or after.odometry is None:
+        return state.slip
+    return _own_slip(state.odometry.joined(after.odometry), after)
+
+
+def _own_slip(odometry: Odometry, now: WheelState) -> Measured:
+    """Slip over several windows, each as noisy as `now`."""
+    slip = slip_over(odometry, now)
+    return Measured(slip.value, slip.sigma / sqrt(odometry.windows))
+
+
+def alike(now: WheelState, before: WheelState, own: Measured | None = None) -> bool:
+    """Whether slip, speed, load and sinkage of two windows agree; own: the slip of `now`, where
+    more is known of it.
+    """
+    slip = now.slip if own is None else own
     pairs = (
         (now.rim_speed, before.rim_speed),
         (now.load, before.load),
         (now.sinkage, before.sinkage),
     )
-    slips = abs(now.slip.value - before.slip.value)
-    noise = hypot(now.slip.sigma, before.slip.sigma)
+    slips = abs(slip.value - before.slip.value)
+    noise = hypot(slip.sigma, before.slip.sigma)
     return slips <= SAME_SLIP + SCATTER * noise and all([_steady(a, b) for a, b in pairs])
 
 
@@ -343,7 +357,8 @@ def slip_over(odometry: Odometry, now: WheelState) -> Measured:
     """Slip over several windows of one condition, each as noisy as `now`; σ as if each had that,
     independently.
     """
-    i, narrowing = slip(*odometry.speeds), odometry.narrowing
+    *speeds, narrowing = odometry.slopes
+    i = slip(*speeds)
     sigma = slip_sigma(i, now.rim_speed.sigma, now.travel_speed.sigma)
     return Measured(i.value, narrowing * sigma)
 

@@ -144,7 +144,7 @@ def test_the_evidence_of_a_change_is_that_of_python_to_the_bit(components, besid
         before, _ = _drawn(rng, components, STATES + beside)
         lines = [_line(rng, components, STATES + beside) for _ in range(stretches)]
         windows = rng.integers(1, 40, stretches).tolist()
-        known = ((0.3, 0.06, 0.1), lines, windows)
+        known = ((0.3, 0.06, 0.1), lines, windows, 0.003)
         python = evidence(before, *known)
         assert arithmetic.evidence(before.x, before.packed, *known) == python
         assert all(np.isfinite(python[0]))

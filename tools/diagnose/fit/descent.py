@@ -90,11 +90,18 @@ class Ground(Protocol[Linearised, Tried]):
     def moved(self, here: Any, tried: Tried) -> Linearised:
         """There, with the slopes of a place so near that they are the same."""
 
+    def followed(self, here: Any, tried: Tried) -> Linearised:
+        """There, with new slopes of few coordinates: the others hardly change."""
 
-def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here, bool]:
-    """The optimum that is reached from a start in so many linearisations; whether it is one."""
+
+def descend(
+    ground: Ground[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
+) -> tuple[Here, bool]:
+    """The optimum that is reached from a start in so many linearisations; whether it is one.
+
+    unsure: where it stands, if its slopes are those of another place.
+    """
     here, damping, again = start, TUNING.fit.damping_start, False
-    unsure: Tried | None = None  # here, if its slopes are those of a place before
 
     for _ in range(rounds):
         held, better = ground.bounds.held(here.centre, here.gradient), None
@@ -111,10 +118,10 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
                 better, again = tried, False
                 softer = TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0
                 damping = max(damping * softer, TUNING.fit.damping_least)
-            elif small and unsure is not None:
+            elif unsure is not None:  # nothing to gain, or misled, by these slopes
                 here, unsure = ground.linearised(unsure), None
                 held = ground.bounds.held(here.centre, here.gradient)
-                damping = TUNING.fit.damping_start
+                damping = TUNING.fit.damping_start if small else damping
             elif not small:
                 damping *= TUNING.fit.damping_harder
             elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.flat:
@@ -125,8 +132,14 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
         if better is None:
             return here, False
         near = foretold < TUNING.fit.near and not bent
-        here = ground.moved(here, better) if near else ground.linearised(better)
-        unsure = better if near else None
+        if near:
+            here, unsure = ground.moved(here, better), better
+        elif share > TUNING.fit.good and not bent:
+            here, unsure = ground.followed(here, better), better
+        else:
+            here, unsure = ground.linearised(better), None
+    if unsure is not None:
+        here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
 
 

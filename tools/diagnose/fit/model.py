@@ -144,6 +144,7 @@ def fit_model(
     start: tuple[Array, Array],
     sizes: Chosen,
     bends: Bends = NO_BENDS,
+    near: Fitted | None = None,
 ) -> Model:
     """Fit and sizes in turns, until the sizes stay and linear algebra has little to add, a few
     rounds at most.
@@ -155,13 +156,15 @@ def fit_model(
 
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
-    a model that holds them.
+    a model that holds them; near: a fit whose derivatives by the constants do for a beginning.
 
     The evidence counts the objective where the fit stands. Slopes that promise more than it could
     reach, at a kink or a bound, do not count.
     """
     every, sizes = (*forms, *bends.freedoms), (*sizes, *bends.sizes)
-    fitted = problem.with_freedoms(every, _values(every, sizes)).descend(effects, free, *start)
+    fitted = problem.with_freedoms(every, _values(every, sizes)).descend(
+        effects, free, *start, near=near
+    )
     for number in range(TUNING.fit.size_rounds):
         known = every
         if number < TUNING.fit.bent_anew or _unbent(fitted, every):
@@ -171,8 +174,8 @@ def fit_model(
 
         beyond = marginal.gain(of_fit)
         sizes, evidence = marginal.likeliest(of_fit)
-        near = beyond < TUNING.fit.last_step
-        if (near and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
+        done = beyond < TUNING.fit.last_step
+        if (done and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
             break
         fitted = problem.with_freedoms(every, _values(every, sizes)).refit(fitted)
 

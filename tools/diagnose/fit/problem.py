@@ -188,18 +188,24 @@ class Problem:
         u: Array,
         x: Array,
         rounds: int | None = None,
+        near: Fitted | None = None,
     ) -> Fitted:
         """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,); the
         strengths of the last effect may be less at the start (`Ground.begun`). rounds: of
-        linearisation at most; 0: it stands where it is put.
+        linearisation at most; 0: it stands where it is put. near: a fit whose derivatives by the
+        constants do for a beginning.
         """
         ground = self.ground(effects, free)
         if rounds == 0:  # as it stands there
             return ground.linearised(ground.tried(ground.at(u, x))[0])
 
         most = TUNING.fit.rounds if rounds is None else rounds
-        start = ground.linearised(ground.begun(u, x))
-        fitted, converged = descent.descend(ground, start, most)
+        begun = ground.begun(u, x)
+        if near is None:
+            fitted, converged = descent.descend(ground, ground.linearised(begun), most)
+        else:
+            start = ground.followed(near, begun)
+            fitted, converged = descent.descend(ground, start, most, begun)
         return replace(fitted, converged=converged)
 
     def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
@@ -302,6 +308,17 @@ class Ground:
         pulled = self._problem.allowance.pulled(here.own)
         return self._fitted(tried, here.raw, here.own, pulled, self._curvature(here.own, pulled))
 
+    def followed(self, here: Fitted, tried: Tried) -> Fitted:
+        """There, with new derivatives by the effects' parameters; those by the constants, which
+        hardly change, are those of a fit elsewhere, with any effects.
+        """
+        problem, first = self._problem, self._count
+        more = self._derivatives(tried.centre, tried.predicted, first)
+        raw = np.column_stack((here.raw[:, :first], more))
+        own = np.column_stack((here.own[:, :first], whiten(problem.noise, more)))
+        pulled = problem.allowance.pulled(own)
+        return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
+
     def _curvature(self, own: Array, pulled: Array) -> Array:
         """(n, n) of derivatives (N, n), what is allowed fitted to each: (t, n) are its products."""
         inside = solve_triangular(self._problem.root, pulled, lower=True, check_finite=False)
@@ -338,11 +355,13 @@ class Ground:
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             return self._problem.stack.predict(centre[: self._count], acting)
 
-    def _derivatives(self, centre: Array, predicted: Array) -> Array:
-        """Of the prediction by every unknown (N, q + p); away from a bound."""
+    def _derivatives(self, centre: Array, predicted: Array, first: int = 0) -> Array:
+        """Of the prediction by every unknown (N, q + p), or by those from one on; away from a
+        bound.
+        """
         stack, raw = self._problem.stack, np.zeros((predicted.size, centre.size))
 
-        for i in (i for i in range(centre.size) if i not in stack.partial):
+        for i in (i for i in range(first, centre.size) if i not in stack.partial):
             step = (
                 -TUNING.fit.step
                 if centre[i] + TUNING.fit.step > self.bounds.high[i]
@@ -355,7 +374,7 @@ class Ground:
         for i, (whole, share) in stack.partial.items():
             raw[:, i] = share * raw[:, whole]
 
-        return np.nan_to_num(raw, nan=0.0, posinf=0.0, neginf=0.0)
+        return np.nan_to_num(raw[:, first:], nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _ends(known: Constant) -> tuple[float, float]:

@@ -8,7 +8,7 @@ than linear algebra by a share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -81,23 +81,35 @@ def _promised(beside: Beside, effect: type[Effect]) -> Promise | None:
     shapes; None without any.
     """
     ranked, screen = beside.screen.fixed[effect.name], beside.screen
-    first = _best_of(beside, effect, ranked[: TUNING.search.again])
+    if beside.model.names:  # by the columns of the screen: one more effect hardly changes them
+        first = _best_of(beside, effect, [screen.best[effect.name]])
+    else:
+        first = _best_of(beside, effect, _made(beside, effect, ranked[: TUNING.search.again]))
     if first is None:
         return None
     usual = TUNING.screen.habit * screen.habit.get(effect.name, 0.0)
     sharp = not beside.model.names and any(p.scan and p.unit == "m" for p in effect.parameters())
-    elsewhere = _apart(ranked)[: TUNING.search.elsewhere] if sharp else []
-    others = (_best_of(beside, effect, [fixed]) for fixed in elsewhere)
+    elsewhere = _made(beside, effect, _apart(ranked)[: TUNING.search.elsewhere]) if sharp else ()
+    others = (_best_of(beside, effect, [made]) for made in elsewhere)
     kept = [p for p in others if p is not None and p.gain > TUNING.search.promising]
     new = tuple(p for p in kept if not np.array_equal(p.start, first.start))
     return replace(first, gain=first.gain - usual, others=new)
 
 
-def _best_of(
-    beside: Beside, effect: type[Effect], shapes: Sequence[dict[str, float]]
-) -> Promise | None:
+def _made(
+    beside: Beside, effect: type[Effect], shapes: Iterable[dict[str, float]]
+) -> Iterator[Signature]:
+    """An effect of some shapes about the model, where it changes anything."""
+    fitted, stack = beside.model.fitted, beside.problem.stack
+    for fixed in shapes:
+        made = signature(stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
+        if made is not None:
+            yield made
+
+
+def _best_of(beside: Beside, effect: type[Effect], shapes: Iterable[Signature]) -> Promise | None:
     """The best promise of an effect of some shapes."""
-    tried = (p for fixed in shapes for p in _tried(beside, effect, fixed))
+    tried = (p for made in shapes for p in _tried(beside, effect, made))
     return max(tried, key=lambda p: np.round(p.gain / TUNING.search.same), default=None)
 
 
@@ -114,13 +126,9 @@ def _apart(ranked: Sequence[dict[str, float]]) -> list[dict[str, float]]:
     ]
 
 
-def _tried(beside: Beside, effect: type[Effect], fixed: dict[str, float]) -> Iterator[Promise]:
+def _tried(beside: Beside, effect: type[Effect], made: Signature) -> Iterator[Promise]:
     """The promise of an effect of some shape for each setting."""
-    fitted, problem = beside.model.fitted, beside.problem
-    made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
-    if made is None:
-        return
-
+    problem = beside.problem
     varied = [] if beside.model.names else varied_along_place(problem.stack, effect, made)
     count = len(made.sign)
     columns = whiten(problem.noise, np.column_stack((made.columns, *varied)))

@@ -119,7 +119,7 @@ def _bare(search: Search, start: Model) -> Model:
     screening = search.screening
     sizes = start.sizes or tuple(0 for _ in screening.forms)
     begins = (start.fitted.u, np.zeros(0))
-    return fit_model(screening.problem, screening.forms, (), (), begins, sizes)
+    return fit_model(screening.problem, screening.forms, (), (), begins, sizes, near=start.fitted)
 
 
 def _the_better(models: Sequence[Model]) -> Iterator[Model]:
@@ -217,6 +217,7 @@ def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
         begins,
         promise.sizes,
         model.other_forms,
+        fitted,
     )
 
 
@@ -269,5 +270,5 @@ def _less(search: Search, model: Model, name: str) -> Model:
     screening, bends = search.screening, model.other_forms.of(kept)
     with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
         return fit_model(
-            screening.problem, screening.forms, types, free, begins, model.sizes, bends
+            screening.problem, screening.forms, types, free, begins, model.sizes, bends, fitted
         )

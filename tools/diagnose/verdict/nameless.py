@@ -60,6 +60,7 @@ def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature], siz
         (fitted.u, fitted.x),
         model.sizes,
         model.other_forms,
+        fitted,
     )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import io
 import multiprocessing
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -26,17 +26,21 @@ _work: Callable[[Any], Any] | None = None  # what the children find when they ar
 
 
 def each(
-    jobs: int, work: Callable[[Item], Made], items: Sequence[Item], kept: Sequence[object] = ()
+    jobs: int,
+    work: Callable[[Item], Made],
+    items: Sequence[Item],
+    kept: Sequence[object] = (),
+    done: Callable[[int], None] = lambda count: None,
 ) -> list[Made]:
     """`work` of every item, in order; in this process alone where memory is scarce. The result must
     be picklable, `work` and the items need not be. Raises what `work` raised, and ChildProcessError
     where a child ended otherwise: a Pool would begin another child in its place for ever.
 
     kept: large objects that results hold and that are here already. They come back as they are
-    here, not as copies.
+    here, not as copies. done: is told how many are.
     """
     if jobs < 2 or len(items) < 2 or is_scarce():
-        return [work(item) for item in items]
+        return _counted((work(item) for item in items), done)
 
     global _work
     # a closure is the point: it is inherited, never pickled
@@ -45,11 +49,20 @@ def each(
         fork = multiprocessing.get_context("fork")
         count = min(jobs, len(items))
         with ProcessPoolExecutor(count, fork, initializer=ends_with_us()) as pool:
-            return [_unpacked(made, kept) for made in pool.map(_forked, range(len(items)))]
+            made = pool.map(_forked, range(len(items)))
+            return _counted((_unpacked(one, kept) for one in made), done)
     except BrokenProcessPool:
         raise ChildProcessError(ENDED) from None
     finally:
         _work = None
+
+
+def _counted(made: Iterable[Made], done: Callable[[int], None]) -> list[Made]:
+    every: list[Made] = []
+    for one in made:
+        every.append(one)
+        done(len(every))
+    return every
 
 
 class _Pickler(pickle.Pickler):

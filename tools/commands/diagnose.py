@@ -10,9 +10,11 @@ import importlib
 import io
 import json
 import os
+import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
@@ -37,6 +39,7 @@ from gritd.tools.commands.diagnose_files import of_files
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain.apply import is_known, rewritten
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.method import OF_REFERENCE
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -55,6 +58,8 @@ DONE_BESIDE_REFERENCE = {
     "looking beside": 0.5,
     "holding out runs and conditions": 0.85,
 }
+
+COUNTED = re.compile(r", (\d+) of (\d+)$")  # fits that are done, at the end of a step's words
 
 
 def main(argv: Sequence[str]) -> int:
@@ -355,11 +360,28 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _steps_of(progress: Progress, referred: bool) -> Callable[[str], None]:
-    """What shows the user that a step begins."""
-    before = DONE_BESIDE_REFERENCE if referred else DONE_BEFORE
+    """What shows the user that a step begins, or how far it is."""
 
     def step(what: str) -> None:
-        done = (share for beginning, share in before.items() if what.startswith(beginning))
-        progress.at(what, next(done, 0.0))
+        progress.at(what, _done_of_pair(what) if referred else _done(DONE_BEFORE, what))
 
     return step
+
+
+def _done_of_pair(what: str) -> float:
+    """Share of the time that is over, of a campaign beside a reference."""
+    if what.startswith(OF_REFERENCE):
+        own = _done(DONE_BEFORE, what.removeprefix(OF_REFERENCE))
+        return own * next(iter(DONE_BESIDE_REFERENCE.values()))
+    return _done(DONE_BESIDE_REFERENCE, what)
+
+
+def _done(before: Mapping[str, float], what: str) -> float:
+    """Share of the time that is over when a step begins, or so many of its fits are done."""
+    counted = COUNTED.search(what)
+    part = int(counted[1]) / int(counted[2]) if counted else 0.0
+    starts = [*before.items(), ("", 1.0)]
+    for (beginning, share), (_, end) in pairwise(starts):
+        if what.startswith(beginning):
+            return share + part * (end - share)
+    return 0.0

@@ -39,6 +39,8 @@ from gritd.tools.diagnose.verdict.anyway import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Verdict
 
+OF_REFERENCE = "the reference: "  # what is done with it alone
+
 
 def diagnose(
     rig: Rig,
@@ -78,7 +80,7 @@ def _diagnose(
 ) -> Diagnosis:
     step("fitting the soil and the noise")
     search = _searched(rig, seed, step, jobs)
-    decision = decide(search, jobs)
+    decision = decide(search, jobs, step)
 
     step("holding out runs and conditions")
     found = explain(search, decision, redo, jobs)
@@ -94,8 +96,12 @@ def accustomed(
     alone = rig.reference
     if alone is None:
         return rig, None
-    step("fitting the reference")
-    decision = decide(_searched(alone, seed, lambda _: None, jobs), jobs)
+
+    def said(what: str) -> None:
+        step(f"{OF_REFERENCE}{what}")
+
+    said("fitting the soil and the noise")
+    decision = decide(_searched(alone, seed, said, jobs), jobs, said)
     return rig.having(had_anyway(alone, decision)), decision.verdict
 
 

@@ -24,6 +24,9 @@ from gritd.tools.diagnose.search.promises import Promise, promises
 from gritd.tools.diagnose.tuning import TUNING
 
 
+FURTHER = {1: "second", 2: "third"}  # effect, beside so many
+
+
 @dataclass(frozen=True)
 class Search:
     """All models that were fitted, and the screen beside the base model.
@@ -90,17 +93,19 @@ def search_models(
     if not search.first.alarmed:
         return search
 
-    step("fitting the likely effects")
-    search = extended(search, [search.bare], TUNING.search.effects_first, jobs)
-    if search.problem.stack.referred:  # beside what the reference tells by itself, too
-        search = extended(search, [search.base], TUNING.search.effects_later, jobs)
+    tell = counting(step, "fitting the likely effects")
+    search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
+    if search.problem.stack.referred:
+        tell = counting(step, "looking beside what the reference tells by itself")
+        search = extended(search, [search.base], TUNING.search.effects_later, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
     for size in range(1, TUNING.search.most_effects):
         starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
         if starts:
-            step(f"looking beside {', or '.join(' and '.join(m.names) for m in starts)}")
-            search = extended(search, starts, TUNING.search.effects_later, jobs)
+            names = ", or ".join(" and ".join(m.names) for m in starts)
+            tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
+            search = extended(search, starts, TUNING.search.effects_later, jobs, tell)
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
@@ -149,10 +154,19 @@ def _near(search: Search, model: Model) -> bool:
 # ---- one more effect ---------------------------------------------------------------------------
 
 
-def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> Search:
+def extended(
+    search: Search,
+    starts: Sequence[Model],
+    most: int,
+    jobs: int,
+    tell: Callable[[int, int], None] = lambda done, of: None,
+) -> Search:
     """With fits of each of some models and one more effect, so many of each at most, but no two of
     the same effects.
+
+    tell: is told how many of how many fits are done; of none before their number is known.
     """
+    tell(0, 0)
     wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
     for model in starts:
         every = promises(search.problem, search.first, model, jobs)
@@ -166,7 +180,8 @@ def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> S
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return attempted(lambda: _with_effect(search, *of))
 
-    made = each(jobs, fitted, list(wanted.values()), shared(search))
+    fits = list(wanted.values())
+    made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
     models = (*search.models, *(model for model in made if model is not None))
     told = zip(wanted.values(), made, strict=True)
     failed = tuple((*start.names, p.effect.name) for (start, p), model in told if model is None)
@@ -180,6 +195,11 @@ def _least_promise(model: Model, every: Sequence[Promise]) -> float:
     alone = TUNING.search.little if model.names else TUNING.search.promising
     top = max((promise.gain for promise in every), default=0.0)
     return max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
+
+
+def counting(step: Callable[[str], None], what: str) -> Callable[[int, int], None]:
+    """Tells what is done, and how many of how many fits of it are."""
+    return lambda done, of: step(f"{what}, {done} of {of}" if of else what)
 
 
 def shared(search: Search) -> list[object]:

@@ -8,7 +8,7 @@ explanations that hold it, as far as it is trusted in them; `unlisted` has the r
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.search.search import Search, shared, without
+from gritd.tools.diagnose.search.search import Search, counting, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.breadth import Breadth
@@ -29,10 +29,10 @@ from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 from gritd.tools.diagnose.verdict.resemblance import trusted
 
 
-def decide(search: Search, jobs: int = 1) -> Decision:
+def decide(search: Search, jobs: int = 1, step: Callable[[str], None] = lambda _: None) -> Decision:
     """The verdict on a search.
 
-    jobs: processes that fit.
+    jobs: processes that fit; step: is told what begins.
     """
     screen = search.first
     if not screen.alarmed:
@@ -41,24 +41,32 @@ def decide(search: Search, jobs: int = 1) -> Decision:
         )
         return Decision(verdict, search.bare, 0.0, None, _quiet(search, screen), 0.0, {})
 
+    step("weighing what has no name")
     evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
     beside = _beside(search, [search.bare, best] if best.names else [search.bare], jobs)
     if beside.get(best) is not None:  # what pays beside the best may pay beside its rivals
-        beside |= _beside(search, _rivals(search, evidence, best), jobs)
+        tell = counting(step, "weighing what has no name")
+        beside |= _beside(search, _rivals(search, evidence, best), jobs, tell)
 
     by = learnt(len(search.problem.stack.rig.effects), search.problem.stack.referred)
     return judged(search, trusting(search, weigh(search, evidence, beside), by), beside, by)
 
 
-def _beside(search: Search, models: Sequence[Model], jobs: int) -> dict[Model, Nameless | None]:
-    """What has no name beside each of some models."""
+def _beside(
+    search: Search,
+    models: Sequence[Model],
+    jobs: int,
+    tell: Callable[[int, int], None] = lambda done, of: None,
+) -> dict[Model, Nameless | None]:
+    """What has no name beside each of some models. tell: is told how many of how many are done."""
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return attempted(lambda: nameless_beside(search.screening, model))
 
-    return dict(zip(models, each(jobs, nameless, models, shared(search)), strict=True))
+    made = each(jobs, nameless, models, shared(search), lambda done: tell(done, len(models)))
+    return dict(zip(models, made, strict=True))
 
 
 def _rivals(search: Search, evidence: Mapping[Model, float], best: Model) -> list[Model]:

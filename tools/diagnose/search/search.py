@@ -23,7 +23,6 @@ from gritd.tools.diagnose.screen.screening import Screening, screen_of_base, wit
 from gritd.tools.diagnose.search.promises import Promise, promises
 from gritd.tools.diagnose.tuning import TUNING
 
-
 FURTHER = {1: "second", 2: "third"}  # effect, beside so many
 
 

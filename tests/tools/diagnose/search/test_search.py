@@ -24,7 +24,7 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search import promises as promising
 from gritd.tools.diagnose.search import search as searching
-from gritd.tools.diagnose.search.promises import Beside, Promise, _tried, promises
+from gritd.tools.diagnose.search.promises import Beside, Promise, _made, _tried, promises
 from gritd.tools.diagnose.search.search import (
     Search,
     _bare,
@@ -80,7 +80,7 @@ def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
     assert (every.sizes[0], every.costs[0]) == (bare.sizes, 0.0)
     beside = Beside(search.problem, search.first, bare, every)
     shapes = search.first.fixed["bulldozing"][: TUNING.search.again]
-    tried = [p for fixed in shapes for p in _tried(beside, kind, fixed)]
+    tried = [p for made in _made(beside, kind, shapes) for p in _tried(beside, kind, made)]
     as_it_is = max(p.gain for p in tried if p.sizes == bare.sizes)
     best = next(p for p in promises(search.problem, search.first, bare) if p.effect is kind)
     assert best.gain > as_it_is + 5.0

@@ -14,9 +14,11 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.cli.progress import Progress
 from gritd.tools.commands import simulate
-from gritd.tools.commands.diagnose import main
+from gritd.tools.commands.diagnose import _steps_of, main
 from gritd.tools.diagnose.explain import provenance
+from gritd.tools.diagnose.method import OF_REFERENCE
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
 from gritd.tools.report.reference import given
 
@@ -219,3 +221,29 @@ def test_a_reference_is_the_recording_that_was_diagnosed(run: Path, tmp_path: Pa
     earlier.write_text(json.dumps(told))
     line, code = said(run, "--config", packaged(), "--reference", earlier)
     assert "/nowhere/gone.mcap" in line and str(tmp_path / "gone.mcap") in line and code == USAGE
+
+
+@pytest.mark.parametrize("referred", [False, True])
+def test_progress_never_goes_back(referred: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fits that are done count, those of a reference by itself too."""
+    shares: list[float] = []
+    monkeypatch.setattr(Progress, "at", lambda _, what, share=0.0: shares.append(share))
+    step = _steps_of(Progress("diagnose"), referred)
+
+    steps = [
+        "fitting the soil and the noise",
+        "screening every effect",
+        "fitting the likely effects",
+        "fitting the likely effects, 1 of 3",
+        "fitting the likely effects, 3 of 3",
+        "looking for a second effect beside backlash, or gear_ripple",
+        "looking for a second effect beside backlash, or gear_ripple, 2 of 4",
+        "looking for a third effect beside backlash and multipass, 1 of 2",
+        "weighing what has no name",
+        "weighing what has no name, 2 of 3",
+    ]
+    for what in [f"{OF_REFERENCE}{s}" for s in steps if referred] + steps:
+        step(what)
+    step("holding out runs and conditions")
+    assert shares == sorted(shares) and 0.9 < shares[-1] < 1.0
+    assert len(set(shares)) >= len(shares) - 1

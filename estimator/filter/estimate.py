@@ -60,6 +60,16 @@ class Update(NamedTuple):
     H: Matrix  # (m, d)
     R: Matrix  # (m, m) noise
 
+    def of(self, components: tuple[int, ...]) -> Update:
+        """The measurement reduced to some of its components."""
+        if len(components) == len(self.innovation):
+            return self
+        return Update(
+            tuple([self.innovation[a] for a in components]),
+            tuple([self.H[a] for a in components]),
+            tuple([tuple([self.R[a][b] for b in components]) for a in components]),
+        )
+
 
 def made(x: Vector, P: Array, log_evidence: float = 0.0) -> Estimate:
     """An estimate from a covariance (d, d)."""

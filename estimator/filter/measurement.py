@@ -201,7 +201,7 @@ class Measurement:
             H=((*_state_gradient(torque), *by_torque), (*_state_gradient(pull), *by_pull)),
             R=self._noise(now, sensitivity),
         )
-        return selected(update, self.kept(now))
+        return update.of(self.kept(now))
 
     def kept(self, now: WheelState) -> tuple[int, ...]:
         """Which of COMPONENTS a window measures."""
@@ -370,17 +370,6 @@ def _variants(settings: Settings) -> list[tuple[WheelModel, Chain]]:
     """Model and effects with one uncertain effect parameter moved by its sigma."""
     moved = [Chain(settings, effects) for effects in variants(settings)]
     return [(WheelModel(settings, chain), chain) for chain in moved]
-
-
-def selected(update: Update, components: tuple[int, ...]) -> Update:
-    """The measurement reduced to some of its components."""
-    if len(components) == len(update.innovation):
-        return update
-    return Update(
-        tuple([update.innovation[a] for a in components]),
-        tuple([update.H[a] for a in components]),
-        tuple([tuple([update.R[a][b] for b in components]) for a in components]),
-    )
 
 
 def _sensitivity(now: WheelState, prediction: Prediction) -> Sensitivity:

@@ -19,7 +19,7 @@ from gritd.estimator.filter.estimate import (
     predict,
 )
 from gritd.estimator.filter.line import Line, line_of
-from gritd.estimator.filter.measurement import Measurement, selected
+from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
 from gritd.estimator.filter.tuning import FORM
 
@@ -116,7 +116,7 @@ class Smoother:
         after = []
         for member, size in zip(bank, FORM.own, strict=True):
             update = Update(line.innovation(member.x), line.H, noises[size])
-            after.append(self._engine.update(member, selected(update, stretch.components)))
+            after.append(self._engine.update(member, update.of(stretch.components)))
         return stretch, tuple(after)
 
     def _doubted(self, doubt: float) -> Vector:

@@ -36,6 +36,16 @@ def _checksum(name: str, entries: Mapping[str, str]) -> str:
     return f"{zlib.crc32(text.encode()):08x}"
 
 
+def changed_versions(then: Mapping[str, str]) -> list[str]:
+    """What computes otherwise than `versions` said then, in words."""
+    now = versions()
+    return [
+        f"{name} {now.get(name, 'absent')}, then {then.get(name, 'absent')}"
+        for name in {**now, **then}
+        if name != TICK_REVISION and then.get(name) != now.get(name)
+    ]
+
+
 @cache
 def versions() -> Mapping[str, str]:
     """What computed this run: a replay that differs can say what changed."""

@@ -10,7 +10,7 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.messages.tick import REVISION, TICK_NAMES, TickRow
 from gritd.estimator.offline.playback import RecordedTick
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.metadata import TICK_REVISION
+from gritd.estimator.recording.metadata import TICK_REVISION, changed_versions
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError
@@ -55,6 +55,8 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
     print(
         f"{first.path}: {differences.compared} ticks, {len(TICK_NAMES)} fields each: {differences}"
     )
+    if differences.ticks and (changed := changed_versions(first.versions)):
+        print(f"  computed by others: {'; '.join(changed)}")
     by = by_processor(configuration)
     if differences.ticks and by:
         print(f"  {by}: another processor alone may give other last digits")

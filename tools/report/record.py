@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gritd.estimator.recording.metadata import versions
+from gritd.estimator.recording import metadata
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.explain.result import Diagnosis, plain
 from gritd.tools.diagnose.rig.signals import sha256
@@ -141,16 +141,9 @@ def check(record: Record) -> None:
             )
 
 
-def changed_versions(record: Record) -> list[str]:
+def changed_versions(then: Record) -> list[str]:
     """What computes otherwise than then, in words."""
-    now = versions()
-    names = [
-        name for name in {**record.versions, **now} if record.versions.get(name) != now.get(name)
-    ]
-    return [
-        f"{name} {now.get(name, 'absent')}, then {record.versions.get(name, 'absent')}"
-        for name in names
-    ]
+    return metadata.changed_versions(then.versions)
 
 
 def differences(then: Record, now: Record) -> Iterator[str]:

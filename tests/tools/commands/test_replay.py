@@ -15,7 +15,7 @@ from gritd.estimator.config.configuration import load, loads, with_engine
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.estimator.recording import run_writer
+from gritd.estimator.recording import metadata, run_writer
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
@@ -177,7 +177,20 @@ def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
     writer.close()
     assert replay.main([str(changed), "--verify"]) == 1
     assert "ticks differ" in (said := capsys.readouterr().out) and "current: logged" in said
-    assert "processor" not in said
+    assert "processor" not in said and "computed by" not in said
+
+
+def test_a_difference_names_what_computed_otherwise(recorded, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(replay_verify.Differences, "compare", lambda self, *_: _differs(self))
+    monkeypatch.setattr(metadata, "versions", lambda: {"python": "3.99.0", "numpy": "9.9"})
+    assert replay.main([str(recorded), "--verify"]) == 1
+    said = capsys.readouterr().out
+    assert "python 3.99.0, then" in said and "numpy 9.9, then" in said
+
+
+def _differs(differences):
+    differences.compared += 1
+    differences.ticks += 1
 
 
 def test_a_recording_of_another_revision_is_not_compared(recorded, tmp_path, monkeypatch, capsys):

@@ -12,6 +12,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.filter.filterpy_engine import FilterpyEngine
 from gritd.tools.bench import against, diagnosis, forward, live, measure, peers
 from gritd.tools.testbed.simulation import soil_of
+from tests.tools.bench.samples import FIGURES
 
 SMALL = measure.Sizes(
     seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0
@@ -33,6 +34,11 @@ def test_every_figure_is_a_positive_number(figures):
     for part in ("missed_at_work", "missed_by_both"):
         assert missed >= figures["live"].pop(part) >= 0.0
     assert all(value > 0.0 for section in figures.values() for value in section.values())
+
+
+def test_the_sample_that_others_use_has_every_figure(figures):
+    assert tuple(FIGURES) == SECTIONS
+    assert all(values.keys() <= FIGURES[section].keys() for section, values in figures.items())
 
 
 def test_ratios_and_shares_are_those_of_their_parts(figures):

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 
 import pytest
 
 from gritd.tools.bench.compare import comparison, is_ratio, ratios
-from gritd.tools.bench.measure import Sizes, measure
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import bench
-
-SMALL = Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0)
-SECTIONS = (
-    *("tick", "replay", "forces", "update", "recording"),
-    *("reading", "writing", "start", "live", "forward_model"),
-)
+from tests.tools.bench.samples import FIGURES
 
 
-@pytest.fixture(scope="module")
-def figures(tmp_path_factory):
-    return measure(SMALL, tmp_path_factory.mktemp("bench"))
+@pytest.fixture
+def figures():
+    return deepcopy(FIGURES)
 
 
 def test_the_report_names_machine_and_every_section(figures):
@@ -51,7 +46,7 @@ def test_json_is_one_object_with_the_machine(figures, monkeypatch, capsys):
     monkeypatch.setattr(bench, "measure", lambda sizes, folder: figures)
     assert bench.main(["--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert set(printed) == {"machine", *SECTIONS} and printed["machine"]["cores"] >= 1
+    assert set(printed) == {"machine", *FIGURES} and printed["machine"]["cores"] >= 1
 
 
 def test_a_usage_error_is_one_line(capsys):

@@ -12,6 +12,7 @@ from types import TracebackType
 from gritd.tools.cli.terminal import LiveLine
 
 QUIET = 2.0  # [s] nothing is shown before
+FEW = 0.01  # share done from which the time left is told
 EVERY = {True: 0.2, False: 5.0}  # [s] between lines on a terminal, and elsewhere
 
 
@@ -48,7 +49,7 @@ class Progress:
         self.advance(done - self._done)
 
     def at(self, step: str, share: float = 0.0) -> None:
-        """This step begins, with about that share of the work done; 0 where nobody knows. A
+        """This step goes on, with about that share of the work done; 0 where nobody knows. A
         terminal shows it at once: the next one may be long in coming.
         """
         self._show(lambda elapsed: _named(step, share, elapsed), at_once=self._line.terminal)
@@ -70,7 +71,7 @@ class Progress:
 
 def _named(step: str, share: float, elapsed: float) -> str:
     """A step, what is done and what is left by the time that the steps before it took."""
-    if share <= 0.0:
+    if share <= FEW:
         return f"{step}, {elapsed:.0f} s"
     left = elapsed * (1.0 - share) / share
     return f"{step} (about {share:.0%}), {elapsed:.0f} s, about {left:.0f} s left"

@@ -33,6 +33,7 @@ from gritd.estimator.wheel import geometry
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.files import open_to_all
+from gritd.tools.cli.progress import Progress
 from gritd.tools.commands.rig_reach import reach
 
 RIM_SPEED = 0.02  # [m/s] at which slip resolution is stated
@@ -89,10 +90,15 @@ def against(settings: Settings, paths: Sequence[Path]) -> int:
     """Print what was driven in recordings by these settings, and what of it cannot be: then the
     code is 1. Raises CommandError.
     """
-    try:
-        runs = [driven_recording(files.recording(path, RAW), settings) for path in paths]
-    except RecordingError as error:
-        raise CommandError(error, DAMAGED) from None
+    runs = []
+    with Progress("reading", len(paths)) as progress:
+        for path in paths:
+            progress.at(path.name)
+            try:
+                runs.append(driven_recording(files.recording(path, RAW), settings))
+            except RecordingError as error:
+                raise CommandError(error, DAMAGED) from None
+            progress.advance()
 
     contradictions = list(warnings(runs))
     sys.stdout.write("\n" + "\n".join([*table(runs), *contradictions]) + "\n")

@@ -52,7 +52,7 @@ def main(argv: Sequence[str]) -> int:
     given = [settings_of(c, r) for c, r in zip(configurations, recordings, strict=True)]
     check_same_rig(given, recordings)
     try:
-        runs = _estimated(list(zip(given, recordings, strict=True)), repeatability)
+        runs = estimated(list(zip(given, recordings, strict=True)), repeatability)
     except RecordingError as error:
         raise CommandError(error, DAMAGED) from None
 
@@ -75,15 +75,31 @@ def _once(paths: Sequence[Path]) -> list[Path]:
     return list(kept.values())
 
 
-def _estimated(
-    given: Sequence[tuple[Settings, Recording]], repeatability: Repeatability
+def estimated(
+    given: Sequence[tuple[Settings, Recording]],
+    repeatability: Repeatability,
+    what: str = "estimating",
 ) -> list[BedRun]:
-    """The runs, with a sign of life."""
-    runs = []
-    with Progress("estimating", len(given)) as progress:
-        for run in bed_runs(given, repeatability):
+    """The runs, with a sign of life. Each is replayed alone, and all but the first with what the
+    ones before it know.
+    """
+    names = [recording.path.name for _, recording in given]
+    sizes = [recording.path.stat().st_size for _, recording in given]
+    work = sum(sizes) + sum(sizes[1:])
+    runs: list[BedRun] = []
+    before = again = 0.0
+    with Progress(what) as progress:
+
+        def advanced(done: int, total: int) -> None:
+            nonlocal before, again
+            at, share = len(runs), done / max(total, 1)
+            again, before = again + (share < before), share
+            through = sum(sizes[:at]) + sum(sizes[1:at]) + sizes[at] * (again + share)
+            progress.at(names[at], through / work)
+
+        for run in bed_runs(given, repeatability, advance=advanced):
             runs.append(run)
-            progress.advance()
+            before = again = 0.0
     return runs
 
 

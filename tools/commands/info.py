@@ -46,6 +46,7 @@ def main(argv: Sequence[str]) -> int:
     damaged = False
     with Progress("reading", len(given)) as progress:
         for path in given:
+            progress.at(path.name)
             recordings = [files.recording(part) for part in parts(path)]
             progress.advance()
             print("\n".join(told(recordings)), end="\n\n" if len(given) > 1 else "\n")

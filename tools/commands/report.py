@@ -10,7 +10,6 @@ from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
-from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.estimator.visible import visible
@@ -25,8 +24,12 @@ from gritd.tools.cli.command import (
     add_configuration,
 )
 from gritd.tools.cli.optional import require
-from gritd.tools.cli.progress import Progress
-from gritd.tools.commands.estimate import check_same_rig, configurations_of, settings_of
+from gritd.tools.commands.estimate import (
+    check_same_rig,
+    configurations_of,
+    estimated,
+    settings_of,
+)
 from gritd.tools.report import campaign, lab
 from gritd.tools.report.numbers import numbers
 
@@ -73,14 +76,10 @@ def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign
     check_same_rig(given, recordings)
 
     repeatability = configurations[0].settings.bed.repeatability
-    runs = []
-    with Progress("report", len(given)) as progress:
-        try:
-            for run in bed_runs(zip(given, recordings, strict=True), repeatability):
-                runs.append(run)
-                progress.advance()
-        except RecordingError as error:
-            raise CommandError(error, DAMAGED) from None
+    try:
+        runs = estimated(list(zip(given, recordings, strict=True)), repeatability, "report")
+    except RecordingError as error:
+        raise CommandError(error, DAMAGED) from None
 
     made = lab.lab_runs(runs)
     return campaign.Campaign(

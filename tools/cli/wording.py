@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from gritd.estimator.filter.tuning import TRUST
 
@@ -86,7 +87,7 @@ def spaced(value: float | None, unit: str, digits: int = 3) -> str:
     return text if text == NOTHING else f"{text} {unit}".rstrip()
 
 
-def listed(names: list[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """a; a and b; a, b and c."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 

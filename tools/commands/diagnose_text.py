@@ -16,7 +16,7 @@ from gritd.tools.diagnose.explain.result import (
     Reference,
     SoilFit,
 )
-from gritd.tools.report.words import quantity
+from gritd.tools.report.words import quantity, to_tell
 
 SHOWN = 4  # places and hypotheses
 DIGITS = 2  # of a probability
@@ -39,7 +39,7 @@ def text(diagnosis: Diagnosis) -> str:
 
     if diagnosis.next_experiment is not None:
         following = diagnosis.next_experiment
-        lines.append(f"  next: {following.action}{_foreseen(following)}")
+        lines.append(f"  next: {following.action}{_foreseen(following, diagnosis.verdict)}")
     lines += [diagnosis.remaining_words, *(f"note: {c}" for c in diagnosis.caveats)]
     return "\n".join(map(visible, lines))
 
@@ -100,6 +100,8 @@ def _fit(fit: Fit) -> Iterator[str]:
         yield f"  on-line filter: {fit.innovation_note}"
 
 
-def _foreseen(following: NextExperiment) -> str:
-    gain = following.expected_gain_nats
-    return f" (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ""
+def _foreseen(following: NextExperiment, verdict: str) -> str:
+    gain, told = following.expected_gain_nats, ""
+    if following.separates:
+        told = f": {to_tell(verdict, following.separates)}"
+    return f"{told} (expected gain {gain:.0f} nats)" if math.isfinite(gain) else told

@@ -31,6 +31,7 @@ from gritd.tools.report.words import (
     name_of,
     nats,
     sentence,
+    to_tell,
 )
 
 NOISE_SIZES = ("sigma", "configured", "configured_sigma")
@@ -244,7 +245,8 @@ def _next(diagnosis: Diagnosis) -> Markup | None:
             "against a rival"
         )
     if following.separates:
-        gain = f"it would tell {listed([name_of(n) for n in following.separates])} apart; {gain}"
+        names = [name_of(n) for n in following.separates]
+        gain = f"{to_tell(diagnosis.verdict, names)}; {gain}"
 
     return tag(
         "section",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 from gritd.tools.cli.wording import (
     NOTHING,
     SCIENTIFIC,
     fixed,
+    listed,
     magnitude,
     number,
     shown,
@@ -17,6 +19,7 @@ from gritd.tools.cli.wording import (
 )
 from gritd.tools.diagnose.explain.result import SOIL, Quantity
 
+FEW = 3  # names are said, of more their number
 LARGE = 0.3  # [m] lengths from here on are read in metres
 HELD = re.compile(r"(?<=[0-9±<>]) (?=[0-9±%σ°]|(?:N|m|mm|s|Pa|kPa|nats)\b)|(?<=[0-9]) (?=±)")
 NAMED = re.compile(r"\S+\.\w")  # run-1.mcap, wheel.radius
@@ -102,3 +105,12 @@ def either(names: list[str]) -> str:
 def counted(count: int, what: str) -> str:
     """1 run, 2 runs."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def to_tell(verdict: str, names: Sequence[str]) -> str:
+    """What an experiment would do about some effects, by the verdict that asked for it."""
+    if verdict == "insufficient":
+        return f"it would show {listed(names) if len(names) <= FEW else f'{len(names)} effects'}"
+    if verdict == "unlisted":
+        return f"it would tell {listed(names)} from what is not listed"
+    return f"it would tell {listed(names)} apart"

@@ -31,7 +31,7 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
     if decision.verdict == "insufficient":
         return _most_shown(_unseen_shown(search))
     if decision.verdict == "unlisted":
-        return _shape_of_misfit(search)
+        return _shape_of_misfit(search, _mistaken(decision))
 
     rivals = _rivals(search, decision)
     return _between(search, rivals) if len(rivals) > 1 else None
@@ -61,9 +61,14 @@ def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
     return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(rig, names)
 
 
-def _most_shown(gains: Mapping[str, float]) -> NextExperiment | None:
-    key = max(gains, key=lambda k: gains[k], default="")
-    return _foretold(key, gains[key]) if key and gains[key] > 0.0 else None
+def _most_shown(gains: Mapping[str, Mapping[str, float]]) -> NextExperiment | None:
+    """The experiment with the largest median gain, and the effects that it would show."""
+    median = {key: float(np.median(list(each.values()))) for key, each in gains.items()}
+    key = max(median, key=lambda k: median[k], default="")
+    if not key or median[key] <= 0.0:
+        return None
+    shown = [n for n, gain in gains[key].items() if gain >= TUNING.explain.gain_worth]
+    return _foretold(key, median[key], tuple(shown))
 
 
 def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
@@ -148,12 +153,12 @@ def _read(rig: Rig, one: Model, other: Model, key: str) -> float:
 # ---- insufficient, and not in the list ---------------------------------------------------------
 
 
-def _unseen_shown(search: Search) -> dict[str, float]:
-    """Of every driven experiment the median gain over effects that these recordings could not show
+def _unseen_shown(search: Search) -> dict[str, dict[str, float]]:
+    """Of every driven experiment the gain for each effect that these recordings could not show
     [nats].
     """
     rig, base = search.problem.stack.rig, search.base
-    unseen = [_expected(rig.effects[name]) for name in _not_shown(search)]
+    unseen = {name: _expected(rig.effects[name]) for name in _not_shown(search)}
 
     out = {}
     for key in rig.menu.driven if unseen else ():
@@ -161,9 +166,11 @@ def _unseen_shown(search: Search) -> dict[str, float]:
         if here is None:
             continue
         slopes = _slopes(search, key, here, base.fitted.u, ())
-        there = [rig.foresee(key, base.fitted.u, (effect,)) for effect in unseen]
-        gains = [_gain(search, here, _values(one) - _values(here), slopes) for one in there]
-        out[key] = float(np.median(gains))
+        there = {n: rig.foresee(key, base.fitted.u, (one,)) for n, one in unseen.items()}
+        out[key] = {
+            name: _gain(search, here, _values(one) - _values(here), slopes)
+            for name, one in there.items()
+        }
     return out
 
 
@@ -195,9 +202,16 @@ def _expected(effect: type[Effect]) -> Effect:
     )
 
 
-def _shape_of_misfit(search: Search) -> NextExperiment | None:
-    """A step of the condition along which the misfit lives; the gain is its evidence so far, for as
-    much again.
+def _mistaken(decision: Decision) -> tuple[str, ...]:
+    """What the misfit may be taken for: effects that it resembles, or the likeliest one."""
+    likeliest = max(decision.probability, key=lambda n: decision.probability[n], default=None)
+    names = tuple(of.name for of in decision.resembled)
+    return names or (() if likeliest is None else (likeliest,))
+
+
+def _shape_of_misfit(search: Search, separates: tuple[str, ...]) -> NextExperiment | None:
+    """A step of the condition along which the misfit lives, to tell some effects from it; the gain
+    is its evidence so far, for as much again.
     """
     evidence = search.first.nameless
     if not evidence:
@@ -206,7 +220,7 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     shape, menu = max(evidence, key=lambda s: evidence[s]), search.problem.stack.rig.menu
     key = menu.along.get(shape.along[0], menu.otherwise)
     gain = evidence[shape] / max(len(search.problem.stack.rig.runs), 1)
-    return _foretold(key, max(gain, 0.0))
+    return _foretold(key, max(gain, 0.0), separates)
 
 
 # ---- what is foreseen --------------------------------------------------------------------------

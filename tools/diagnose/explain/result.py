@@ -165,7 +165,10 @@ class Law:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """expected_probability: that of what is true, of two as likely now, after the expected gain.
+    """separates: effects that are told apart; of an unlisted misfit those that are told from it;
+    where the recordings were insufficient, those that would show.
+
+    expected_probability: that of what is true, of two as likely now, after the expected gain.
     NaN: not foreseen.
     """
 

@@ -19,6 +19,7 @@ def proposed(found: Diagnosis) -> str:
     assert following is not None and following.action == EXPERIMENTS[following.key]
     assert 0.0 < following.expected_gain_nats < np.inf
     assert 0.5 < following.expected_probability <= 1.0
+    assert following.separates
     return following.key
 
 

@@ -72,8 +72,9 @@ def expected() -> Iterator[str]:
 
 def own() -> Iterator[str]:
     """The files of `gritd/` itself, beside its links to the four folders."""
-    for path in (ROOT / "gritd").rglob("*.py"):
-        if not any(folder.is_symlink() for folder in path.parents):
+    for path in (ROOT / "gritd").rglob("*.*"):
+        linked = any(folder.is_symlink() for folder in path.parents)
+        if path.suffix in (".py", ".typed") and not linked:
             yield str(path.relative_to(ROOT))
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.cli.wording import listed, number, shown, spelled
 from gritd.tools.diagnose.explain.result import Fit, Location
@@ -43,7 +45,7 @@ def summary(
         first = location[0]
         sentences = [f"{first.where} {p}; {_held_out(fit, first.channel)}."]
     if decision.verdict == "unlisted":
-        sentences += ["No listed effect explains it.", *map(_resembling, decision.resembled)]
+        sentences += [_unexplained(decision), *map(_resembling, decision.resembled)]
         return " ".join(sentences)
 
     names = listed(list(decision.best.names))
@@ -99,6 +101,20 @@ def _alike(decision: Decision) -> Iterator[str]:
 def _beside(decision: Decision) -> Iterator[str]:
     for of in decision.resembled:
         yield f"What {of.name} would add is something else: its form fits badly."
+
+
+def _unexplained(decision: Decision) -> str:
+    """That no effect is named; where some are likely together but none alone, which."""
+    chances = sorted(decision.probability.items(), key=lambda item: -item[1])
+    least = chances[0][1] * np.exp(-TUNING.verdict.alike) if chances else 0.0
+    alike = {name: chance for name, chance in chances if chance > least}
+    together = sum(alike.values())
+    if len(alike) < 2 or together <= decision.unlisted:
+        return "No listed effect explains it."
+    return (
+        f"One of {', '.join(alike)} is there with {together:.0%}, but none of these alone is"
+        f" likelier than that nothing of the list is ({decision.unlisted:.0%})."
+    )
 
 
 def _resembling(of: Resembled) -> str:

@@ -26,7 +26,7 @@ def _fit(torque: tuple[float, float], sinkage: tuple[float, float] = (0.004, 0.0
 
 
 def _decision(verdict: str, *names: str, **more: Any) -> Any:
-    kept = {"groups": {}, "share": 0.9, "resembled": (), **more}
+    kept = {"groups": {}, "share": 0.9, "resembled": (), "probability": {}, "unlisted": 1.0, **more}
     return SimpleNamespace(verdict=verdict, best=SimpleNamespace(names=names), **kept)
 
 
@@ -59,6 +59,15 @@ def test_an_effect_that_must_be_bent_far_is_said_to_resemble() -> None:
     decision = _decision("unlisted", resembled=(resembled,))
     told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
     assert "resembles torque_constant_error" in told and "42%" in told and "40%" in told
+
+
+def test_several_that_are_likely_together_but_not_alone_are_told() -> None:
+    likely = {"b": 0.26, "a": 0.3, "c": 0.17, "d": 0.01}
+    decision = _decision("unlisted", probability=likely, unlisted=0.31)
+    told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
+    assert "a, b, c" in told and "73%" in told and "31%" in told
+    alone = _decision("unlisted", probability={"a": 0.3, "b": 0.01}, unlisted=0.69)
+    assert "No listed effect" in summary(alone, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
 
 
 def test_agreement_with_a_strained_constant_says_so() -> None:

@@ -1,33 +1,37 @@
 """From the bytes of a message to its fields, by the definition that stands in its file; needs
-rosbags, but for JSON.
+rosbags, or protobuf, but for JSON.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
 Decoder = Callable[[bytes], Any]
 MSG, IDL = ("ros1msg", "ros2msg"), ("ros2idl",)
 PART = "=" * 80 + "\n"  # stands before each type that a definition needs
-READ = "ros1, cdr (ros2msg, ros2idl) and json"
+READ = "ros1, cdr (ros2msg, ros2idl), protobuf and json"
 
 
 class Undecodable(Exception):
     """Messages cannot be decoded; the message says of what kind they are, and what is read."""
 
 
-def decoder(kind: str, encoding: str, schema: str, text: str, own: Mapping[str, str]) -> Decoder:
+def decoder(
+    kind: str, encoding: str, schema: str, definition: bytes, own: Mapping[str, str]
+) -> Decoder:
     """What decodes messages of a type.
 
     kind: the type's name, package/msg/Name. encoding: of messages, as MCAP names it. schema: of the
-    definition `text`. own: further definitions by name, where the file has none. What it returns
+    definition. own: further definitions by name, where the file has none. What it returns
     raises ValueError at bytes that are no such message. Raises Undecodable.
     """
     if encoding == "json":
         return json.loads
+    if encoding == schema == "protobuf":
+        return _of_protobuf(kind, definition)
     if encoding not in ("cdr", "ros1"):
         raise Undecodable(
             f"found messages in {encoding[:20] or 'no encoding'}; expected {READ}; or the topic "
@@ -35,14 +39,18 @@ def decoder(kind: str, encoding: str, schema: str, text: str, own: Mapping[str, 
         )
 
     try:
-        store, name = _store(kind, schema, text, own)
+        store, name = _store(kind, schema, definition.decode(errors="replace"), own)
     except Undecodable:
         raise
     except Exception as error:  # of a definition that is none
-        reason = " ".join(str(error).split())[:100]
-        raise Undecodable(f"the definition of {kind} cannot be read: {reason}") from None
+        raise _no_definition(kind, error) from None
     read = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     return lambda data: _decoded(read, data, name)
+
+
+def _no_definition(kind: str, error: Exception) -> Undecodable:
+    reason = " ".join(str(error).split())[:100]
+    return Undecodable(f"the definition of {kind} cannot be read: {reason}")
 
 
 def _decoded(read: Callable[[bytes, str], Any], data: bytes, name: str) -> Any:
@@ -92,3 +100,51 @@ def _known(name: str, own: Mapping[str, str]) -> Any:
             f"the bag does not define {name}; expected {package}/msg/{last}.msg beside the bag"
         )
     return store
+
+
+# --- protobuf ---
+
+
+def _of_protobuf(kind: str, definition: bytes) -> Decoder:
+    """definition: a FileDescriptorSet. Raises Undecodable."""
+    try:
+        sets = import_module("google.protobuf.descriptor_pb2").FileDescriptorSet
+        pool = import_module("google.protobuf.descriptor_pool").DescriptorPool()
+        class_of = import_module("google.protobuf.message_factory").GetMessageClass
+    except ImportError:
+        install = "pip install 'gritd[formats]'"
+        raise Undecodable(f"found no protobuf; expected it installed: {install}") from None
+
+    try:
+        files = {file.name: file for file in sets.FromString(definition).file}
+        for name in list(files):
+            _add(pool, files, name)
+        message = class_of(pool.FindMessageTypeByName(kind))
+    except Exception as error:  # of a definition that is none
+        raise _no_definition(kind, error) from None
+    return lambda data: _plain(_decoded(lambda body, _: message.FromString(body), data, kind))
+
+
+def _add(pool: Any, files: dict[str, Any], name: str) -> None:
+    """Add a file after those that it needs."""
+    file = files.pop(name, None)
+    if file is not None:
+        for other in file.dependency:
+            _add(pool, files, other)
+        pool.AddSerializedFile(file.SerializeToString())
+
+
+def _plain(value: Any) -> Any:
+    """A message as a dictionary of its fields; parts that it does not hold are left out."""
+    if hasattr(value, "DESCRIPTOR"):
+        fields = [field.name for field in value.DESCRIPTOR.fields]
+        there = {field.name for field, _ in value.ListFields()}
+        found = {name: getattr(value, name) for name in fields}
+        return {
+            name: _plain(each)
+            for name, each in found.items()
+            if name in there or not hasattr(each, "DESCRIPTOR")
+        }
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [_plain(each) for each in value]
+    return value

@@ -16,7 +16,8 @@ import numpy as np
 
 STEP = re.compile(r"([^.\[\]]+)(?:\[([^\]]*)\])?(?:\.|$)")
 NAMES = ("name", "names", "joint_names")  # fields that name the elements of the arrays beside them
-TIMES = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a time
+# fields of a time
+TIMES = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("seconds", "nanos"))
 MOST = 64  # elements of an array that get names of their own; a longer one is no set of channels
 NS = 1_000_000_000
 
@@ -77,6 +78,8 @@ def nanoseconds(value: Any) -> int | None:
 def stamp(message: Any) -> int | None:
     """When a message says that it was measured [ns]; None where it does not say."""
     header = _field(message, "header")
+    if header is None and (time := nanoseconds(_field(message, "timestamp"))) is not None:
+        return time
     return nanoseconds(_field(message if header is None else header, "stamp"))
 
 

@@ -70,11 +70,11 @@ def _messages(recordings: Sequence[Recording], name: str) -> Iterator[tuple[int,
 
 def _decoder(source: Source) -> Any:
     schema, channel = source.schema, source.channel
-    if channel.message_encoding != "json" and (how := missing("rosbags")):
+    if channel.message_encoding not in ("json", "protobuf") and (how := missing("rosbags")):
         raise Undecodable(how)
-    text = schema.data.decode(errors="replace") if schema else ""
+    definition = schema.data if schema else b""
     kind, encoding = (schema.name, schema.encoding) if schema else ("", "")
-    return decoder(kind, channel.message_encoding, encoding, text, {})
+    return decoder(kind, channel.message_encoding, encoding, definition, {})
 
 
 def _kind(value: Any) -> str:

@@ -69,9 +69,11 @@ def read_mcap(path: Path, wanted: Wanted) -> list[SeriesTable]:
     for source in recording.sources.values():
         schema, channel = source.schema, source.channel
         kind, encoding = (schema.name, schema.encoding) if schema else ("", "")
-        text = schema.data.decode(errors="replace") if schema else ""
+        definition = schema.data if schema else b""
         try:
-            decoders[channel.topic] = decoder(kind, channel.message_encoding, encoding, text, {})
+            decoders[channel.topic] = decoder(
+                kind, channel.message_encoding, encoding, definition, {}
+            )
         except Undecodable as why:
             refused[channel.topic] = str(why)
 
@@ -125,8 +127,8 @@ def _decoder(connection: Any, first: bool, own: Mapping[str, str]) -> Decoder:
     """first: of a bag of ROS 1."""
     formats = import_module("rosbags.interfaces").MessageDefinitionFormat
     schema = {formats.MSG: "ros2msg", formats.IDL: "ros2idl"}.get(connection.msgdef.format, "")
-    text = connection.msgdef.data
-    return decoder(connection.msgtype, "ros1" if first else "cdr", schema, text, own)
+    definition = connection.msgdef.data.encode()
+    return decoder(connection.msgtype, "ros1" if first else "cdr", schema, definition, own)
 
 
 def _definitions(path: Path) -> dict[str, str]:

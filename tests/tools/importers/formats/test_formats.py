@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -36,6 +37,7 @@ FORMATS: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "mcap": (writers.mcap, TOPICS, "rosbags"),
     "mcap_folder": (writers.mcap_folder, TOPICS, "rosbags"),
     "json.mcap": (writers.mcap_json, TOPICS, "rosbags"),
+    "protobuf.mcap": (writers.mcap_protobuf, TOPICS, "google.protobuf"),
 }
 CHANNELS = ("time", "wheel_angle, unit: rad", "carriage_position, unit: m")
 CHANNELS = (*CHANNELS, "time", "drawbar_pull, unit: N")
@@ -184,3 +186,14 @@ def test_log_times_of_zero_are_no_times(
     stamps = recording.arrays("/raw/wheel_encoder")["stamp"]
     assert stamps[0] == writers.START and len(stamps) == writers.ROWS
     assert "log times are no times" in capsys.readouterr().out
+
+
+def test_without_protobuf_one_line_says_how_to_install_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("google.protobuf")
+    writers.mcap_protobuf(tmp_path / "run.mcap")
+    monkeypatch.setitem(sys.modules, "google.protobuf.descriptor_pb2", None)
+    with pytest.raises(CommandError) as error:
+        imported(tmp_path / "run.mcap", map_of(TOPICS))
+    assert "protobuf" in str(error.value) and "pip install 'gritd[formats]'" in str(error.value)

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 DRIVE = {"t": TIME, "wheel": WHEEL, "cart": CART}
 CELL = {"t": TIME[::2], "pull": PULL}
 
+TOPICS = ("/drive", "/cell")
+
 
 def parquet(path: Path) -> None:
     """One table: empty where the load cell did not read."""
@@ -246,7 +248,7 @@ def mcap_json(path: Path, logged: bool = True, stamped: bool = True) -> None:
         writer.start()
         ids = {
             topic: writer.register_channel(topic, "json", writer.register_schema(topic, "", b""))
-            for topic in ("/drive", "/cell")
+            for topic in TOPICS
         }
         for at, seconds in enumerate(TIME.tolist()):
             stamp = START + round(seconds * 1e9)
@@ -256,4 +258,49 @@ def mcap_json(path: Path, logged: bool = True, stamped: bool = True) -> None:
             for topic, body in (("/drive", drive), ("/cell", cell))[: 1 + (at % 2 == 0)]:
                 data = json.dumps((head if stamped else {}) | body).encode()
                 writer.add_message(ids[topic], stamp if logged else 0, data, stamp)
+        writer.finish()
+
+
+def mcap_protobuf(path: Path) -> None:
+    """As the tools of Foxglove write it; the definition's files are not in the order of their
+    needs.
+    """
+    pb = import_module("google.protobuf.descriptor_pb2")
+    stamps = import_module("google.protobuf.timestamp_pb2")
+    files = pb.FileDescriptorSet()
+    file = files.file.add(name="bench.proto", package="bench", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    stamps.DESCRIPTOR.CopyToProto(files.file.add())
+
+    field = pb.FieldDescriptorProto
+    double, text, part = field.TYPE_DOUBLE, field.TYPE_STRING, field.TYPE_MESSAGE
+    one, many = field.LABEL_OPTIONAL, field.LABEL_REPEATED
+    drive = file.message_type.add(name="Drive")
+    drive.field.add(name="angle", number=1, type=double, label=one)
+    state = file.message_type.add(name="State")
+    stamp = {"type": part, "type_name": ".google.protobuf.Timestamp"}
+    state.field.add(name="timestamp", number=1, label=one, **stamp)
+    state.field.add(name="drive", number=2, type=part, type_name=".bench.Drive", label=one)
+    state.field.add(name="travel", number=3, type=double, label=many)
+    state.field.add(name="effort", number=4, type=double, label=many)
+    state.field.add(name="name", number=5, type=text, label=many)
+
+    pool = import_module("google.protobuf.descriptor_pool").DescriptorPool()
+    for each in reversed(files.file):
+        pool.AddSerializedFile(each.SerializeToString())
+    factory = import_module("google.protobuf.message_factory")
+    make = factory.GetMessageClass(pool.FindMessageTypeByName("bench.State"))
+
+    with path.open("wb") as out:
+        writer = import_module("mcap.writer").Writer(out)
+        writer.start()
+        schema = writer.register_schema("bench.State", "protobuf", files.SerializeToString())
+        ids = {topic: writer.register_channel(topic, "protobuf", schema) for topic in TOPICS}
+        for at, seconds in enumerate(TIME.tolist()):
+            ns = START + round(seconds * 1e9)
+            when = {"seconds": ns // 10**9, "nanos": ns % 10**9}
+            moved = make(timestamp=when, drive={"angle": WHEEL[at]}, travel=[0.0, CART[at]])
+            felt = make(timestamp=when, effort=[0.1, PULL[at // 2]], name=["arm", "cell"])
+            for topic, message in zip(TOPICS, (moved, felt)[: 1 + (at % 2 == 0)], strict=False):
+                writer.add_message(ids[topic], ns + 10**6, message.SerializeToString(), ns)
         writer.finish()

@@ -21,6 +21,7 @@ from gritd.tools.importers.series.times import ORDERS, TimeFormatError, likely_u
 
 OFTEN = (2e-4, 1.0)  # [s] between the rows of a log: the unit of time that gives this is likely
 DAYS = (30_000.0, 80_000.0)  # what numbers of days of a spreadsheet lie between from 1982 on
+DATENUM = (690_000.0, 770_000.0)  # MATLAB's, from 1889 to 2108: no unit of a map counts from there
 EVEN = 0.05  # share of its usual step by which an even column's steps may differ
 FORCES = ("drawbar_pull", "load", "lateral_force")
 SIDES = {
@@ -119,6 +120,8 @@ def _of_time(name: str, column: Column, meaning: Meaning, unit: Unit | None) -> 
     if known.size < 3 or np.ptp(known) == 0.0:
         return None
     units, why = _units_of_time(known, unit)
+    if not units:
+        return None
     options = [Option(f"channel: time, unit: {u}", f"{why}, {_range(known)}") for u in units]
     asks = "in which unit it is" if len(options) > 1 else ""
     return Proposal(name, TIME, meaning.sure, tuple(options), asks)
@@ -135,6 +138,8 @@ def _units_of_time(known: Array, unit: Unit | None) -> tuple[list[str], str]:
     low, high = OFTEN
     if DAYS[0] < np.median(known) < DAYS[1] and low < step * 86_400.0 <= high:
         return ["d, epoch: 1899-12-30"], "days of a spreadsheet"
+    if DATENUM[0] < np.median(known) < DATENUM[1] and low < step * 86_400.0 <= high:
+        return [], ""
     sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     likely = [name for name, size in sizes.items() if low < step * size <= high]
     return likely or ["s"], f"rows {step:.4g} apart"

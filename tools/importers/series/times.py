@@ -55,7 +55,10 @@ FORMS = {
         "of hour": MINUTES,
     }.items()
 }
-FAR = "292 years or more; expected a finer unit of time, ms, us or ns"
+FAR = (
+    "292 years or more; expected a finer unit of time, ms, us or ns; of MATLAB's datenum "
+    "(t - 719529) * 86400, in s"
+)
 PERIODS = {"of day": DAY, "of hour": HOUR}
 
 

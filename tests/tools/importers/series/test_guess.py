@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import gritd
+from gritd.tools.cli.command import CommandError
 from gritd.tools.commands.import_rig import main
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.guess import guessed
@@ -258,6 +259,19 @@ def test_days_of_a_spreadsheet_are_dates(tmp_path: Path) -> None:
     stamps = gritd.read(out / "run.mcap")["raw/wheel_encoder"]["stamp"]
     noon = np.datetime64("2026-11-26T12:00", "ns").astype(np.int64)
     assert abs(int(stamps[0]) - noon) < 50_000 and abs(np.median(np.diff(stamps)) - 2e7) < 1e5
+
+
+def test_days_of_matlab_are_not_taken_for_seconds_and_are_told(tmp_path: Path) -> None:
+    days = [f"{739_580.5 + at / 86_400 / 50:.11f}" for at in range(ROWS)]
+    columns = {"t": days, "wheel rpm": NOISE + NOISE[:10], "cart mm/s": NOISE + NOISE[:10]}
+    text = guess_of(tmp_path, columns)
+    assert "channel: time" not in text and "# ? rate:" in text
+
+    channels = "wheel rpm: {channel: wheel_speed, unit: rpm}\n  t: {channel: time, unit: d}"
+    (tmp_path / "map.yaml").write_text(f"columns:\n  {channels}\n")
+    command = ["series", f"{tmp_path}/run.csv", "--map", f"{tmp_path}/map.yaml", "-o", "out"]
+    with pytest.raises(CommandError, match=r"datenum.*719529"):
+        main(command)
 
 
 def test_a_topic_that_every_bag_has_is_in_each(tmp_path: Path) -> None:

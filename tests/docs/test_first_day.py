@@ -49,7 +49,7 @@ def test_the_calibration_finds_the_true_scale(day: tuple[Path, dict[str, str]]) 
 
 @pytest.mark.slow
 def test_the_guess_names_every_column_as_the_map_does(day: tuple[Path, dict[str, str]]) -> None:
-    guess, *_ = of(day[1], "gritd import csv stranger/*.csv --guess")
+    guess, *_ = of(day[1], "gritd import series stranger/*.csv --guess")
     for line in (FIRST_DAY / "map.yaml").read_text().splitlines():
         if match := re.match(r"  (\w+): \{channel: (\w+), unit: ([^,}]+)", line):
             assert f"{match[1]}: {{channel: {match[2]}, unit: {match[3]}" in guess

@@ -24,6 +24,7 @@ from gritd.estimator.recording.metadata import RECOVERED, RUN, sealed
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.commands import recover
 from gritd.tools.commands.check_config import summary
+from gritd.tools.dev.twenty.campaigns import SWEPT, Held, Run
 from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
 from tests.estimator.recording.samples import pieces
 from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
@@ -40,6 +41,7 @@ MOVED = "chunks swapped or duplicated"
 EMPTY = "file of 8 bytes"
 NUMBERS = "metadata and configuration of impossible numbers"
 ADDRESS = "300 and 500 MB of address space"
+SLOWEST = "the slowest campaign of diagnose"
 
 
 @pytest.mark.parametrize("command", ["replay", "recover", "compare", "diagnose"])
@@ -52,6 +54,39 @@ def test_bomb_inside_the_limits_of_a_chunk(tmp_path, command, chunks, figure):
     assert "internal error" not in done.error
     figure(BOMB, AS_PROCESSES, "memory", done.memory, "MB", 400)
     figure(BOMB, AS_PROCESSES, "processor time", done.seconds, "s", 10, real=True)
+
+
+@pytest.mark.slow
+def test_the_campaign_that_a_diagnosis_takes_longest_for(tmp_path, figure):
+    """Friction of the load axis follows the whole of every run; beside it a friction that does
+    not.
+    """
+    seconds = {}
+    for effects in (
+        ("coulomb_friction.loss=0.15",),
+        ("load_axis_friction.friction=3", "load_axis_friction.travel=0.0002"),
+    ):
+        acting = [each for effect in effects for each in ("--effect", effect)]
+        runs = [_driven(tmp_path, load, acting) for load in (30, 45, 60, 75, 90, 105)]
+        done = watched("diagnose", *runs, *CONFIG, "--jobs", 1)
+        assert done.code == 0, done.error
+        assert effects[0].partition(".")[0] in done.out
+        figure(SLOWEST, AS_PROCESSES, "memory", done.memory, "MB", 600)
+        seconds[effects] = done.seconds
+
+    usual, slowest = seconds.values()
+    figure(SLOWEST, AS_PROCESSES, "processor time over that of another", slowest / usual, "", 5)
+
+
+def _driven(folder, load, acting):
+    """A simulated run under a load [N] in which effects act."""
+    schedule, run = folder / "schedule.yaml", folder / f"run-{load}.mcap"
+    schedule.write_text(Run(float(load), (*SWEPT, Held(0.2, seconds=20.0))).schedule)
+    where = ("--schedule", schedule, "--seed", load, "-o", run)
+    run.unlink(missing_ok=True)
+    code, said = in_process("simulate", *CONFIG, *where, *acting)
+    assert code == 0, said
+    return run
 
 
 def test_the_limit_can_be_raised(tmp_path):

@@ -92,6 +92,7 @@ LISTED = """
 78 | DBC that others may write
 79 | a file that is no DBC
 80 | table of 100,000 columns
+81 | the slowest campaign of diagnose
 82 | two readings in one read of the bus
 83 | readings stamped on receipt, 16 to 116 ms late
 84 | dask: worker killed, hung, of another version; TLS

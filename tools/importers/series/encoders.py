@@ -38,7 +38,8 @@ def quantum(runs: Sequence[SeriesRun], name: str, column: Mapped) -> float:
         step = values.resolution or spacing(values.numbers)
         time = run.interval_of(name) if column.channel in SPEEDS else 1.0
         span = float(np.nanmax(np.abs(values.numbers), initial=0.0)) * time
-        steps.append(max(step * time, span * FINEST, LEAST_COUNT / column.per_unit))
+        least = LEAST_COUNT / (column.per_unit * abs(column.factor.value))
+        steps.append(max(step * time, span * FINEST, least))
 
     return min(steps)
 

@@ -39,8 +39,12 @@ def scatter(seconds: Array, values: Array, resolution: float) -> float:
 
 
 def spacing(values: Array) -> float:
-    """The least step between values (n,) that repeat, which are rounded to it; 0 where none do."""
+    """What values (n,) are rounded to: 1 where all are whole numbers, else the least step between
+    values that repeat; 0 where none do.
+    """
     distinct = np.unique(values[np.isfinite(values)])
+    if distinct.size > 1 and bool(np.all(distinct == np.round(distinct))):
+        return 1.0
     if distinct.size < 2 or distinct.size > 0.5 * values.size:
         return 0.0
     return float(np.min(np.diff(distinct)))

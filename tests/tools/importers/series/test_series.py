@@ -236,6 +236,29 @@ def test_sixteen_digits_of_a_speed_are_no_resolution(tmp_path: Path) -> None:
     assert turned == pytest.approx(np.trapezoid(speeds, t) * np.pi / 30, abs=1e-7)
 
 
+TURN = "turn: {channel: wheel_angle, unit: mrad}"
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.0153])
+def test_counts_kept_as_floats_are_counts(tmp_path: Path, factor: float) -> None:
+    """MDF, HDF5, NumPy and MATLAB keep whole numbers as floats that write no last digit."""
+    rng, t = np.random.default_rng(1), np.arange(0.0, 8.0, 0.02)
+    torque, way = 3.0 + 0.1 * rng.standard_normal(t.size), np.round(900.0 * t)
+    np.savez(tmp_path / "run.npz", t=t, way=way, turn=np.round(9000.0 * t), M=torque)
+    text = MAP.replace(
+        "rpm: {channel: wheel_speed, unit: rpm}", "turn: {channel: wheel_angle, unit: mrad}"
+    )
+    text = text.replace("v: {channel: carriage_speed, unit: mm/s}",
+                        f"way: {{channel: carriage_position, unit: mm, factor: {factor}}}")  # fmt: skip
+    output = imported(tmp_path, tmp_path / "run.npz", text=text)
+    settings = config.load(output / "csv.yaml").settings
+    scale = settings.channels["carriage_encoder"].calibration.scale.value
+    assert scale * settings.pulley_radius == pytest.approx(1e-3 * factor)
+    assert (
+        read(output / "run.mcap").arrays("/raw/carriage_encoder")["count"].tolist() == way.tolist()
+    )
+
+
 def test_a_header_without_rows_is_told(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("t,rpm,v,M\n")
     assert "found no rows" in complaint(DAMAGED, tmp_path / "run.csv", "--guess")

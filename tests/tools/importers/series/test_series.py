@@ -237,6 +237,7 @@ def test_sixteen_digits_of_a_speed_are_no_resolution(tmp_path: Path) -> None:
 
 
 TURN = "turn: {channel: wheel_angle, unit: mrad}"
+WAY = "way: {{channel: carriage_position, unit: mm, factor: {}}}"
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.0153])
@@ -245,18 +246,14 @@ def test_counts_kept_as_floats_are_counts(tmp_path: Path, factor: float) -> None
     rng, t = np.random.default_rng(1), np.arange(0.0, 8.0, 0.02)
     torque, way = 3.0 + 0.1 * rng.standard_normal(t.size), np.round(900.0 * t)
     np.savez(tmp_path / "run.npz", t=t, way=way, turn=np.round(9000.0 * t), M=torque)
-    text = MAP.replace(
-        "rpm: {channel: wheel_speed, unit: rpm}", "turn: {channel: wheel_angle, unit: mrad}"
-    )
-    text = text.replace("v: {channel: carriage_speed, unit: mm/s}",
-                        f"way: {{channel: carriage_position, unit: mm, factor: {factor}}}")  # fmt: skip
+    text = MAP.replace("rpm: {channel: wheel_speed, unit: rpm}", TURN)
+    text = text.replace("v: {channel: carriage_speed, unit: mm/s}", WAY.format(factor))
     output = imported(tmp_path, tmp_path / "run.npz", text=text)
     settings = config.load(output / "csv.yaml").settings
     scale = settings.channels["carriage_encoder"].calibration.scale.value
     assert scale * settings.pulley_radius == pytest.approx(1e-3 * factor)
-    assert (
-        read(output / "run.mcap").arrays("/raw/carriage_encoder")["count"].tolist() == way.tolist()
-    )
+    counts = read(output / "run.mcap").arrays("/raw/carriage_encoder")["count"]
+    assert counts.tolist() == way.tolist()
 
 
 def test_a_header_without_rows_is_told(tmp_path: Path) -> None:

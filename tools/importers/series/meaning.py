@@ -169,13 +169,13 @@ def _motion(means: set[str], words: set[str], unit: Unit | None) -> Meaning | No
     if "height" in means and not speed and fits("sinkage", unit):
         return Meaning("sinkage", 0, HEIGHT)
 
-    counts = "counts" in means and (unit is None or unit.name == "count")
+    counts = "counts" in means if unit is None else unit.name == "count"
     if "wheel" in means:
         return _wheel(speed, counts, unit)
     if "carriage" in means:
         kind = "count" if counts else "speed" if speed else "position"
         return Meaning(f"carriage_{kind}", 2, _of_counts("carriage", counts))
-    return _unnamed(means, words, speed, counts, unit)
+    return _unnamed(means, words, speed, counts and "counts" in means, unit)
 
 
 def _wheel(speed: bool, counts: bool, unit: Unit | None) -> Meaning | None:

@@ -126,6 +126,11 @@ ROBOTS: dict[str, Header] = {
         "v_l(ips)": "",
         "batt_V": "",
     },
+    "units in brackets": {
+        "t [s]": "time",
+        "wheel [count]": "wheel_count?",
+        "cart [counts]": "carriage_count?",
+    },
     "two encoders": {"t_ms": "time", "left_encoder": "wheel_count?", "right_encoder": ""},
     "traction and steering": {
         "time": "time",

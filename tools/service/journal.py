@@ -69,7 +69,9 @@ class Journal:
         for reader in self._readers:
             stats = reader.stats()
             subject = f"device {reader.device}"
-            self._tell(daemon, subject, now, (*self._device(stats), *self._counted(stats, now)))
+            self._tell(daemon, subject, now, self._device(stats))
+            # a subject of its own: a count must not take the place of how the port stands
+            self._tell(daemon, f"{subject}, amiss", now, self._counted(stats, now))
 
         self._tell(daemon, "queue", now, self._queue_fell_behind(now))
         self._tell(daemon, "log", now, self._log(daemon, now))

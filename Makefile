@@ -52,7 +52,7 @@ type: $(READY) ## mypy --strict
 docs: $(READY) ## the generated parts of the documents
 	@$(BIN)/python -m gritd.tools.dev.config_reference
 
-proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their part of docs/proof.md
+proof: $(READY) ## the proofs on real recordings in ../shared/real; writes docs/real-recordings.md
 	@$(BIN)/python -m gritd.tools.proof.real
 
 scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page

@@ -22,7 +22,7 @@ class RunningIn(Effect):
     `contact_relaxation`.
     Source: none published. A first-order approach to the steady state of Eqs. (1)-(10) over a
     length like that of the contact; the form was chosen here, after single-wheel trials that start
-    from rest (MGST, docs/proof.md).
+    from rest (MGST, docs/real-recordings.md).
     """
 
     pull: float = strength(

@@ -1,5 +1,5 @@
-"""`python -m gritd.tools.proof.real`: the proofs on recordings of others, and what docs/proof.md
-says of them.
+"""`python -m gritd.tools.proof.real`: the proofs on recordings of others, and what
+docs/real-recordings.md says of them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PROOFS: tuple[Proof, ...] = (
     chrono.TERRAIN,
 )
 DATA = ROOT.parent / "shared" / "real"
-DOCS, PAGE = ROOT / "docs", "proof.md"
+DOCS, PAGE = ROOT / "docs", "real-recordings.md"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -105,7 +105,11 @@ def _parser() -> Parser:
         "--only", action="append", choices=names, metavar="NAME", help=f"of {', '.join(names)}"
     )
     parser.add_argument(
-        "--output", type=_folder, default=DOCS, metavar="DIR", help="where proof.md and figures go"
+        "--output",
+        type=_folder,
+        default=DOCS,
+        metavar="DIR",
+        help="where the page and its figures go",
     )
 
     return parser

@@ -1,4 +1,4 @@
-"""The section of docs/proof.md that the proofs write."""
+"""The sections of docs/real-recordings.md that the proofs write."""
 
 from __future__ import annotations
 
@@ -50,20 +50,9 @@ def _lines(
 
     yield from _missed([check for check in finding.checks if not check.met])
 
-    yield f"**Said**, unedited, in {seconds:.0f} s for all commands of this proof:"
+    yield f"**Commands**, {seconds:.0f} s in all:"
     yield ""
-
-    for diagnosis in finding.diagnoses:
-        yield "```"
-        yield f"$ {diagnosis.command}"
-        yield diagnosis.text
-        yield "```"
-        yield ""
-
-    others = [c for c in commands if c not in {s.command for s in finding.diagnoses}]
-    yield "The other commands:"
-    yield ""
-    yield from ("```sh", *others, "```")
+    yield from ("```sh", *commands, "```")
     yield ""
 
 

@@ -51,7 +51,7 @@ def test_a_miss_stays_in_with_its_reason_once() -> None:
     assert text.count("**no**") == 2
     assert "*Is it found?* *How large?* A reason over two lines." in text
     assert "not shown" not in text
-    assert "verdict: unlisted" in text, "unedited"
+    assert "gritd import rig\ngritd diagnose a.mcap\n" in text
     assert "| 1\\|2 | 3 |" in text
 
 
@@ -100,4 +100,4 @@ def test_absent_data_are_skipped_with_a_line(
         f"EMPS, friction concealed: skipped, found no {tmp_path / 'emps'}"
         in capsys.readouterr().out
     )
-    assert not (tmp_path / "proof.md").exists()
+    assert not (tmp_path / "real-recordings.md").exists()

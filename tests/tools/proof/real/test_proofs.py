@@ -1,5 +1,5 @@
-"""The proofs on real recordings say today what docs/proof.md says of them; misses are not asserted,
-nor hidden.
+"""The proofs on real recordings say today what docs/real-recordings.md says of them; misses are
+not asserted, nor hidden.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from gritd.tools.proof.blind.plant.servo import follow, summed
 
 ROUNDS = 2  # of path-dependent effects, which need the sinkage that depends on them
 SERVO_STEP = 2e-3  # [s]
-SWEEPS = 2  # of motion against soil; docs/proof.md states what a third changes
+SWEEPS = 2  # of motion against soil; docs/trials.md states what a third changes
 
 
 @dataclass(frozen=True)

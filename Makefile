@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios coverage fuzz soak install uninstall wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios coverage fuzz soak install uninstall lock wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -66,6 +66,9 @@ fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody mea
 
 soak: $(READY) ## 100 simulated hours, then the daemon on wires for an hour under load
 	@$(BIN)/python -m gritd.tools.dev.soak
+
+lock: ## config/requirements.lock anew, with the newest releases (needs uv)
+	@tools/lock
 
 install: ## lay gritd out on this Debian system (DESTDIR=… for a package); see docs/service.md
 	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install install

@@ -6,6 +6,7 @@ import platform
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,10 +14,13 @@ from shutil import copytree, ignore_patterns, which
 from zipfile import ZipFile
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ("gritd", "estimator", "drivers", "config", "tools")
 PAGES = ("pyproject.toml", "README.md", "LICENSE")
+OF_THE_CHECKOUT = {"gritd/config/requirements.lock", "gritd/tools/install", "gritd/tools/lock"}
 DEVELOPMENT = ("gritd/tools/dev", "gritd/tools/proof/ours", "gritd/tools/proof/real")
 
 # a folder of the user's, with packages that have the names of our folders
@@ -85,9 +89,8 @@ def names_in(wheel: Path) -> set[str]:
 
 def test_the_wheel_holds_every_file_but_those_for_development(wheel: Path) -> None:
     held = {name for name in names_in(wheel) if not name.endswith(".so")}
-    packed = set(expected()) - {"gritd/tools/install"}  # a script of the checkout
 
-    assert held == packed | set(own())
+    assert held == set(expected()) - OF_THE_CHECKOUT | set(own())
 
 
 @pytest.mark.skipif(which("gcc") is None, reason="found no compiler")
@@ -120,6 +123,25 @@ def test_the_source_archive_holds_what_the_wheel_does(checkout: Path, wheel: Pat
 
     packed = {name for name in names_in(wheel) if not name.endswith(".so")}
     assert {name for name in names if name.startswith("gritd/")} == packed
+
+
+def asked_for() -> Iterator[Requirement]:
+    """What `make install` must bring: the dependencies, the view, and what builds gritd."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    yield from map(Requirement, project["project"]["dependencies"])
+    yield from map(Requirement, project["project"]["optional-dependencies"]["view"])
+    yield from map(Requirement, project["build-system"]["requires"])
+
+
+def test_the_lock_has_what_the_project_asks_for_and_no_matplotlib() -> None:
+    lines = (ROOT / "config" / "requirements.lock").read_text().splitlines()
+    pins = [line.rstrip(" \\").split("==") for line in lines if "==" in line]
+    locked = {canonicalize_name(name): version for name, version in pins}
+
+    assert "matplotlib" not in locked
+    for asked in asked_for():
+        version = locked.get(canonicalize_name(asked.name))
+        assert version is not None and version in asked.specifier, f"{asked}: run `make lock`"
 
 
 @pytest.fixture(scope="module")

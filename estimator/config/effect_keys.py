@@ -46,16 +46,18 @@ class Effects:
         if not entries(item, "a mapping of parameters"):
             raise item.place.error("no parameter", f"at least one of {', '.join(known)}")
 
-        keys = {
-            p: Key(UncertainQuantity(kind), "parameter", self._default(name, p))
-            for p, kind in known.items()
-        }
-        return Section(keys, dict, "a mapping of parameters")
+        return parameters(name, known)
 
-    @staticmethod
-    def _default(name: str, parameter: str) -> str:
-        """The library's own value: off for a strength, usual for a shape."""
-        if name not in EFFECTS:
-            return NEEDED
-        own = next(p for p in EFFECTS[name].parameters() if p.name == parameter)
-        return f"{own.centre!r} {own.unit}".strip()
+
+def parameters(name: str, known: Mapping[str, Quantity]) -> Section:
+    """The keys of one effect. A default is the library's own value: off for a strength, usual for
+    a shape.
+    """
+    own = {p.name: p for p in EFFECTS[name].parameters()} if name in EFFECTS else {}
+    keys = {
+        p: Key(UncertainQuantity(kind), own[p].meaning, f"{own[p].centre!r} {own[p].unit}".strip())
+        if p in own
+        else Key(UncertainQuantity(kind), "parameter", NEEDED)
+        for p, kind in known.items()
+    }
+    return Section(keys, dict, "a mapping of parameters")

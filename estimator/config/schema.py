@@ -29,6 +29,7 @@ from gritd.estimator.config.yamltree import (
 
 NEEDED = "\0needed"
 ABSENT = "\0absent"  # may be left out, and then there is none
+NAMES = r"[A-Za-z_][A-Za-z0-9_.-]{0,63}"  # of the user's choosing
 
 
 class Impossible(Exception):
@@ -68,9 +69,13 @@ class UncertainQuantity:
                 raise node.place.error(describe(node), self.expected)
             value, _ = self.quantity.read(node)
             return Uncertain(value), node
+        return self.mapping().read(node)
+
+    def mapping(self) -> Section:
+        """The form with both."""
         sigma = Quantity(self.quantity.unit, low=0.0, high=self.quantity.high)
         keys = {"value": Key(self.quantity, "value"), "sigma": Key(sigma, "standard deviation")}
-        return Section(keys, Uncertain).read(node)
+        return Section(keys, Uncertain)
 
 
 @dataclass(frozen=True)
@@ -149,7 +154,7 @@ class Named:
         values: dict[str, Any] = {}
         filled: dict[str, Node] = {}
         for name, item in entries(node, self.expected).items():
-            if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}", name):
+            if not re.fullmatch(NAMES, name):
                 raise item.place.error(
                     f"the name {shown(name)!r}", "letters, digits, '_', '-' or '.', a letter first"
                 )

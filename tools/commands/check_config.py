@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 import time
@@ -14,6 +15,7 @@ from gritd.drivers.can_signals import amiss_elsewhere
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.channels import UNITS
+from gritd.estimator.config.json_schema import json_schema
 from gritd.estimator.config.settings import (
     Calibration,
     Channel,
@@ -57,6 +59,11 @@ def main(argv: Sequence[str]) -> int:
         "--effective", action="store_true", help="print the YAML with every default filled in"
     )
     parser.add_argument(
+        "--schema",
+        action="store_true",
+        help="print the JSON Schema of the configuration, for editors, and read no file",
+    )
+    parser.add_argument(
         "--against",
         type=Path,
         action="append",
@@ -65,6 +72,10 @@ def main(argv: Sequence[str]) -> int:
         help="a recording to hold it against, as often as wanted: exit 1 where it cannot be",
     )
     arguments = parser.parse_args(argv)
+
+    if arguments.schema:
+        print(json.dumps(json_schema(), indent=1, ensure_ascii=False))
+        return DONE
 
     read = config.load(arguments.file)
 

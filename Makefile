@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios coverage fuzz soak install uninstall lock wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs man proof scenarios coverage fuzz soak install uninstall lock wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -52,6 +52,9 @@ type: $(READY) ## mypy --strict
 docs: $(READY) ## the generated parts of the documents
 	@$(BIN)/python -m gritd.tools.dev.config_reference
 
+man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
+	@$(BIN)/python -m gritd.tools.dev.manual build/man
+
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes docs/real-recordings.md
 	@$(BIN)/python -m gritd.tools.proof.real
 
@@ -77,7 +80,7 @@ uninstall: ## take it away again; configuration and recordings stay
 	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install uninstall
 
 wheel: $(READY) ## dist/gritd-….whl
-	@rm -rf build  # setuptools packs what an earlier build left there
+	@rm -rf build/lib* build/bdist*  # setuptools packs what an earlier build left there
 	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir dist .
 	@ls dist/*.whl
 

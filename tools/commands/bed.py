@@ -19,7 +19,7 @@ from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_nam
 
 def main(argv: Sequence[str]) -> int:
     """Show the bed, or begin a new one. Raises CommandError, ConfigError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     folder = _folder(arguments)
     try:
         if arguments.what == "new":
@@ -58,7 +58,7 @@ def lines(folder: Path, bed: Bed | None) -> Iterator[str]:
     yield f"  tan φ    {x[TAN_PHI]:.4f} ± {sqrt(P[TAN_PHI][TAN_PHI]):.4f}"
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd bed", description="The bed in the bin: show it, or begin a new one."
     )

@@ -23,28 +23,7 @@ from gritd.tools.cli.command import DONE, FAILED, Parser
 
 def main(argv: Sequence[str]) -> int:
     """Measure and print. Exit 0; 1 where a ratio is worse by a fifth than in an earlier run."""
-    parser = Parser(
-        prog="gritd bench",
-        description="What everything costs on this machine, and what others take for the same; "
-        "one or two minutes.",
-    )
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
-
-    parser.add_argument(
-        "--compare",
-        type=Path,
-        metavar="OLD.json",
-        help="fail where a ratio is worse by a fifth than in this output of --json",
-    )
-
-    parser.add_argument(
-        "--long",
-        action="store_true",
-        help="also a minute at 1 kHz, an hour's replay, and diagnoses of several runs and of long "
-        "ones: a quarter of an hour",
-    )
-
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     before = loaded(arguments.compare) if arguments.compare else {}
     with TemporaryDirectory(prefix="gritd-bench-") as folder:
         figures = measure(LONG if arguments.long else Sizes(), Path(folder))
@@ -211,3 +190,28 @@ def _side_by_side(title: str, figures: Figures) -> list[str]:
 
 def _µs(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} µs"
+
+
+def build_parser() -> Parser:
+    parser = Parser(
+        prog="gritd bench",
+        description="What everything costs on this machine, and what others take for the same; "
+        "one or two minutes.",
+    )
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
+
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        metavar="OLD.json",
+        help="fail where a ratio is worse by a fifth than in this output of --json",
+    )
+
+    parser.add_argument(
+        "--long",
+        action="store_true",
+        help="also a minute at 1 kHz, an hour's replay, and diagnoses of several runs and of long "
+        "ones: a quarter of an hour",
+    )
+
+    return parser

@@ -40,7 +40,7 @@ Procedure = Callable[[argparse.Namespace, Settings], Outcome]
 
 def main(argv: Sequence[str]) -> int:
     """Calibrate, print, write where asked. Raises CommandError, ConfigError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     source = Path(arguments.config)
     place = None
     if arguments.apply is not None or arguments.in_place:
@@ -233,7 +233,7 @@ def _ask(what: str) -> None:
 # --- options ---
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd calibrate",
         description="Fit scale and offset to known values; see docs/calibrating.md.",

@@ -49,29 +49,7 @@ def main(argv: Sequence[str]) -> int:
     """Print the summary, or the effective YAML. Raises ConfigError or CommandError for a file that
     cannot work.
     """
-    parser = Parser(
-        prog="gritd check-config", description="Check a configuration and show what it implies."
-    )
-    parser.add_argument(
-        "file", nargs="?", default=packaged(), help="default: the packaged testbed.yaml"
-    )
-    parser.add_argument(
-        "--effective", action="store_true", help="print the YAML with every default filled in"
-    )
-    parser.add_argument(
-        "--schema",
-        action="store_true",
-        help="print the JSON Schema of the configuration, for editors, and read no file",
-    )
-    parser.add_argument(
-        "--against",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a recording to hold it against, as often as wanted: exit 1 where it cannot be",
-    )
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
 
     if arguments.schema:
         print(json.dumps(json_schema(), indent=1, ensure_ascii=False))
@@ -343,3 +321,30 @@ def _table(rows: Rows) -> str:
         for row in rows
     )
     return "\n".join(lines)
+
+
+def build_parser() -> Parser:
+    parser = Parser(
+        prog="gritd check-config", description="Check a configuration and show what it implies."
+    )
+    parser.add_argument(
+        "file", nargs="?", default=packaged(), help="default: the packaged testbed.yaml"
+    )
+    parser.add_argument(
+        "--effective", action="store_true", help="print the YAML with every default filled in"
+    )
+    parser.add_argument(
+        "--schema",
+        action="store_true",
+        help="print the JSON Schema of the configuration, for editors, and read no file",
+    )
+    parser.add_argument(
+        "--against",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a recording to hold it against, as often as wanted: exit 1 where it cannot be",
+    )
+
+    return parser

@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int:
     """Print the errors, draw what was asked for. Exit 3 if a recording is damaged: then it is of
     what was whole. Raises ConfigError or CommandError.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     if arguments.png:
         require("matplotlib", "--png")
     for path in filter(None, (arguments.report, arguments.png)):
@@ -76,7 +76,7 @@ def main(argv: Sequence[str]) -> int:
     return DAMAGED if fitted.damage else DONE
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd compare",
         description="Draw the forward simulation over recordings, with the residual.",

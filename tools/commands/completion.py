@@ -1,22 +1,17 @@
 """`gritd completion bash|zsh|fish`: what makes the shell complete commands, options and names.
 
-The options are those that each command's `--help` names, so the script is never behind.
+The options are those of each command's parser, so the script is never behind.
 """
 
 from __future__ import annotations
 
-import importlib
-import io
-import re
-from argparse import RawDescriptionHelpFormatter
+from argparse import ArgumentParser, RawDescriptionHelpFormatter, _SubParsersAction
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import redirect_stdout, suppress
 
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.cli.command import DONE, Parser
-from gritd.tools.commands.table import COMMANDS
+from gritd.tools.commands.table import COMMANDS, parser_of
 
-OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 HOW = {
     "bash": 'eval "$(gritd completion bash)"       # in ~/.bashrc',
     "zsh": 'eval "$(gritd completion zsh)"        # in ~/.zshrc, after compinit',
@@ -26,34 +21,24 @@ HOW = {
 
 def main(argv: Sequence[str]) -> int:
     """Print the script of a shell."""
-    shells = "\n".join(f"  {line}" for line in HOW.values())
-
-    parser = Parser(
-        prog="gritd completion",
-        description="Print what makes the shell complete gritd's commands and options.",
-        epilog=f"to have it in every shell:\n{shells}",
-        formatter_class=RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("shell", choices=HOW)
-
-    print(SCRIPTS[parser.parse_args(argv).shell](words()))
+    print(SCRIPTS[build_parser().parse_args(argv).shell](words()))
     return DONE
 
 
 def words() -> dict[str, list[str]]:
     """Command → what may follow it beside files: its options, and for some its names."""
-    options = {name: options_of(module) for name, (module, _) in COMMANDS.items()}
+    options = {name: sorted(options_of(parser_of(name))) for name in COMMANDS}
     options["effects"] += list(EFFECTS)
     options["completion"] += list(HOW)
     return options
 
 
-def options_of(module: str) -> list[str]:
-    """The options that a command's help names."""
-    help_text = io.StringIO()
-    with suppress(SystemExit), redirect_stdout(help_text):  # so --help ends
-        importlib.import_module(module).main(["--help"])
-    return sorted({*OPTION.findall(help_text.getvalue())})
+def options_of(parser: ArgumentParser) -> set[str]:
+    """The long options of a command, and of its subcommands."""
+    actions = parser._actions  # argparse has no public way
+    own = {word for action in actions for word in action.option_strings if word.startswith("--")}
+    below = [a.choices.values() for a in actions if isinstance(a, _SubParsersAction)]
+    return own.union(*(options_of(each) for parsers in below for each in parsers))
 
 
 def bash(known: Mapping[str, Sequence[str]]) -> str:
@@ -95,3 +80,17 @@ def fish(known: Mapping[str, Sequence[str]]) -> str:
 
 
 SCRIPTS = {"bash": bash, "zsh": zsh, "fish": fish}
+
+
+def build_parser() -> Parser:
+    shells = "\n".join(f"  {line}" for line in HOW.values())
+
+    parser = Parser(
+        prog="gritd completion",
+        description="Print what makes the shell complete gritd's commands and options.",
+        epilog=f"to have it in every shell:\n{shells}",
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("shell", choices=HOW)
+
+    return parser

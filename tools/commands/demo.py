@@ -37,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0 if every target is met, 1 with the reason if not. Raises CommandError where a process
     fails.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     folder = Path(arguments.output or Path("runs") / time.strftime("demo-%Y%m%d-%H%M%S"))
     folder.mkdir(parents=True, exist_ok=True)
     with interruptible() as stop:
@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int:
     return conclude(folder, arguments.plant, last_words)
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd demo", description="Run the daemon against the simulated testbed on real wires."
     )

@@ -86,7 +86,7 @@ def main(argv: Sequence[str]) -> int:
 
 def _given(argv: Sequence[str]) -> argparse.Namespace:
     """What is asked for, with outputs that can be written. Raises CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     _check_outputs(arguments)
     return arguments
 
@@ -286,7 +286,7 @@ def _apply(
         )
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd diagnose",
         description=(

@@ -19,15 +19,7 @@ NONE = "nothing"
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0. Raises CommandError."""
-    parser = Parser(
-        prog="gritd diff",
-        description="How two recordings differ in configuration, calibration, run and versions.",
-    )
-    parser.add_argument("first", type=Path, metavar="A")
-    parser.add_argument("second", type=Path, metavar="B")
-    parser.add_argument("--json", action="store_true", help="as a list of keys")
-
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     found = differences(made(arguments.first), made(arguments.second))
 
     if arguments.json:
@@ -63,3 +55,15 @@ def told(found: Sequence[Difference]) -> Iterator[str]:
                 f"  {each.key:{width}}  {each.first or NONE} → {each.second or NONE}"
                 for each in lines
             )
+
+
+def build_parser() -> Parser:
+    parser = Parser(
+        prog="gritd diff",
+        description="How two recordings differ in configuration, calibration, run and versions.",
+    )
+    parser.add_argument("first", type=Path, metavar="A")
+    parser.add_argument("second", type=Path, metavar="B")
+    parser.add_argument("--json", action="store_true", help="as a list of keys")
+
+    return parser

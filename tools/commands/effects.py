@@ -15,11 +15,7 @@ WIDTH = 96
 
 def main(argv: Sequence[str]) -> int:
     """Raises CommandError for a name that is no effect."""
-    parser = Parser(
-        prog="gritd effects", description="The effects, or all that is known of one of them."
-    )
-    parser.add_argument("name", nargs="?", metavar="NAME", help="an effect")
-    name = parser.parse_args(argv).name
+    name = build_parser().parse_args(argv).name
 
     if name is not None and name not in EFFECTS:
         raise CommandError(
@@ -93,3 +89,12 @@ def _parameter(parameter: Parameter) -> str:
 
 def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+def build_parser() -> Parser:
+    parser = Parser(
+        prog="gritd effects", description="The effects, or all that is known of one of them."
+    )
+    parser.add_argument("name", nargs="?", metavar="NAME", help="an effect")
+
+    return parser

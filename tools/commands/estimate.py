@@ -44,7 +44,7 @@ UNUSUAL = 16.27  # chi-square, 3 degrees of freedom: 0.1 % of runs of the same s
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 where no run could be used; 3 where a recording is damaged. Raises CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     recordings = [files.recording(path, STREAMS) for path in _once(arguments.files)]
     configurations = configurations_of(recordings, arguments)
     repeatability = _repeatability(configurations[0].settings.bed.repeatability, arguments)
@@ -330,7 +330,7 @@ def _json(known: Known) -> dict[str, Any]:
     }
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd estimate",
         description="The soil of a bed from several runs, handed from run to run by the filter.",

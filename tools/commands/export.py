@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where the recording is damaged, or something of it does not go into a table: then
     the tables hold what is whole, and the rest is named. Raises CommandError.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     if arguments.form == "parquet":
         require("pyarrow", "--parquet")
 
@@ -108,7 +108,7 @@ def _written(
     return [*paths, folder / tables.COLUMNS]
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd export", description="Write the topics of a recording as tables, one a topic."
     )

@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Exit code 0. Raises CommandError where a file is not what the importer expects or cannot be
     written.
     """
-    args = _parser().parse_args(argv)
+    args = build_parser().parse_args(argv)
     if (IMPORTERS, args.rig) in left_out:
         raise PluginError(left_out[IMPORTERS, args.rig])
     try:
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return DONE
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd import",
         description="Time series and other rigs' data to recordings; see docs/importing.md.",

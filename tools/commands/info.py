@@ -33,15 +33,7 @@ INDENT = " " * 15
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a recording is damaged. Raises CommandError."""
-    parser = Parser(prog="gritd info", description="What recordings are and hold.")
-    parser.add_argument(
-        "files",
-        nargs="+",
-        type=Path,
-        metavar="FILE",
-        help="recordings (.mcap); parts of a run are found",
-    )
-    given = parser.parse_args(argv).files
+    given = build_parser().parse_args(argv).files
 
     damaged = False
     with Progress("reading", len(given)) as progress:
@@ -181,3 +173,16 @@ def _filter(first: Recording) -> Iterator[str]:
     yield report(Path("logged"), first.arrays("/tick"), "ticks")
     if first.counts["/loop"] > 1:
         yield from (f"  {line}" for line in punctuality(np.asarray(first.arrays("/loop"))))
+
+
+def build_parser() -> Parser:
+    parser = Parser(prog="gritd info", description="What recordings are and hold.")
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="recordings (.mcap); parts of a run are found",
+    )
+
+    return parser

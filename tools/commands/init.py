@@ -21,11 +21,7 @@ testbed.dbc describes its CAN messages. `gritd calibrate --help` lists what can 
 
 def main(argv: Sequence[str]) -> int:
     """Write the files. Raises CommandError where one is there already or none can be written."""
-    parser = Parser(prog="gritd init", description="Lay out a folder to work in.")
-    parser.add_argument(
-        "folder", type=Path, metavar="DIR", help="made where it is missing; no file is replaced"
-    )
-    folder = parser.parse_args(argv).folder
+    folder = build_parser().parse_args(argv).folder
 
     files = {name: packaged(name).read_bytes() for name in ("testbed.yaml", "testbed.dbc")}
     ports = sorted(BY_ID.iterdir()) if BY_ID.is_dir() else []
@@ -63,3 +59,12 @@ def write(folder: Path, files: dict[str, bytes]) -> None:
         raise CommandError(
             f"{error.filename or folder}: {reason}; expected a folder to write into", USAGE
         ) from None
+
+
+def build_parser() -> Parser:
+    parser = Parser(prog="gritd init", description="Lay out a folder to work in.")
+    parser.add_argument(
+        "folder", type=Path, metavar="DIR", help="made where it is missing; no file is replaced"
+    )
+
+    return parser

@@ -32,13 +32,7 @@ INDENT = " " * 14
 
 def main(argv: Sequence[str]) -> int:
     """Show the daemon until q or Ctrl-C, or once; raises CommandError where none answers."""
-    parser = Parser(prog="gritd monitor", description="Watch the running daemon; q ends it.")
-    add_socket(parser)
-    parser.add_argument(
-        "--once", action="store_true", help="one picture, without control characters"
-    )
-
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
 
     with connected(arguments.socket) as connection:
         if arguments.once or not redrawable():
@@ -217,3 +211,13 @@ def _number(value: Any, factor: float, decimals: int) -> str:
 def _lateness(loop: Report) -> str:
     names = (("late_50", "50 %"), ("late_99", "99 %"), ("late_999", "99.9 %"), ("late_max", "max"))
     return ", ".join(f"{loop[key] * 1e3:.2f} ({label})" for key, label in names if key in loop)
+
+
+def build_parser() -> Parser:
+    parser = Parser(prog="gritd monitor", description="Watch the running daemon; q ends it.")
+    add_socket(parser)
+    parser.add_argument(
+        "--once", action="store_true", help="one picture, without control characters"
+    )
+
+    return parser

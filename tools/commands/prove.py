@@ -27,7 +27,7 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     """Run the trials, open the answers, print the score; 1 where a diagnosis failed. Raises
     CommandError.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     if arguments.online:
         # it loads what is judged, which the trials of the diagnosis must not
         from gritd.tools.proof.online import command
@@ -108,7 +108,7 @@ def _tell(rows: Sequence[Row], begun: batch.Batch, output: Path) -> None:
     print(f"\n{output / SCORE}, {output / PAGE}")
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd prove",
         description="Blind trials: an independent plant conceals, `gritd diagnose` names.",

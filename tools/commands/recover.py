@@ -26,13 +26,7 @@ LONGEST = 18  # digits of a number of messages
 
 def main(argv: Sequence[str]) -> int:
     """Exit code: 0 nothing lost, 3 saved in part. Raises CommandError."""
-    parser = Parser(prog="gritd recover", description=__doc__)
-    parser.add_argument("file", type=Path, help="the recording; it is not changed")
-    parser.add_argument(
-        "-o", "--output", type=Path, help="default: FILE with .recovered before its suffix"
-    )
-
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     source: Path = arguments.file
 
     try:
@@ -147,3 +141,16 @@ def _lost(earlier: Mapping[str, str]) -> int:
     """Messages that an earlier recovery missed; 0 where it does not say so in figures."""
     text = earlier.get("lost", "")
     return int(text) if text.isdecimal() and len(text) <= LONGEST else 0
+
+
+def build_parser() -> Parser:
+    parser = Parser(
+        prog="gritd recover",
+        description="Write a clean, indexed recording of what a damaged one still holds.",
+    )
+    parser.add_argument("file", type=Path, help="the recording; it is not changed")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="default: FILE with .recovered before its suffix"
+    )
+
+    return parser

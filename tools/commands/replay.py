@@ -56,7 +56,7 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 if a verified replay differs; 2 for usage and configuration; 3 if a recording is
     damaged.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     if arguments.carry and (arguments.verify or arguments.output):
         raise CommandError("--carry: expected neither --verify nor --output with it", USAGE)
     if arguments.verify and (arguments.config or arguments.output or arguments.engine):
@@ -233,7 +233,7 @@ def _target(arguments: Namespace, path: Path) -> Path:
     return output / path.name if output.is_dir() else output
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(prog="gritd replay", description="Run the on-line filter over recordings.")
     parser.add_argument(
         "files", nargs="+", metavar="FILE", help="recordings (.mcap); parts of a run are found"

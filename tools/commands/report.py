@@ -36,7 +36,7 @@ from gritd.tools.report.numbers import numbers
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a recording is damaged. Raises CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     output = arguments.json or arguments.figure or arguments.output
     files.writable(output)
     if arguments.figure:
@@ -95,7 +95,7 @@ def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign
     )
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd report",
         description=(

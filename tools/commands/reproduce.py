@@ -14,13 +14,7 @@ SIMULATIONS = 60_000
 
 def main(argv: Sequence[str]) -> int:
     """Print every section; 0 when done."""
-    parser = Parser(prog="gritd reproduce", description="The paper's figures beside ours.")
-    parser.add_argument(
-        "--simulations", type=whole(1), default=SIMULATIONS, help=f"default: {SIMULATIONS}"
-    )
-    parser.add_argument("--seed", type=whole(0), default=2005)
-
-    arguments = parser.parse_args(argv)
+    arguments = build_parser().parse_args(argv)
 
     for section in (
         closed_forms(arguments.seed),
@@ -34,3 +28,13 @@ def main(argv: Sequence[str]) -> int:
             print(line, flush=True)
 
     return DONE
+
+
+def build_parser() -> Parser:
+    parser = Parser(prog="gritd reproduce", description="The paper's figures beside ours.")
+    parser.add_argument(
+        "--simulations", type=whole(1), default=SIMULATIONS, help=f"default: {SIMULATIONS}"
+    )
+    parser.add_argument("--seed", type=whole(0), default=2005)
+
+    return parser

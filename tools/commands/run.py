@@ -31,7 +31,7 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the
     configuration.
     """
-    parser = _parser()
+    parser = build_parser()
     arguments = parser.parse_args(argv)
     if arguments.fast and not arguments.from_tap:
         parser.error("argument --fast: only with --from-tap")
@@ -144,7 +144,7 @@ def _run_info(run: RunInfo, arguments: object) -> RunInfo:
     return replace(run, **{key: value for key, value in given.items() if value is not None})
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd run",
         description="Run the daemon until SIGTERM or Ctrl-C. SIGHUP reloads the configuration.",

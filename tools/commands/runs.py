@@ -48,7 +48,7 @@ WIDEST = 40  # letters of a column
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a file cannot be read, which is told. Raises CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     if not arguments.folder.is_dir():
         raise CommandError(
             f"{arguments.folder}: found no folder; expected one with recordings", USAGE
@@ -126,7 +126,7 @@ def _plain(of: RunEntry) -> dict[str, Any]:
     return {**asdict(of), "path": str(of.path)}
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(prog="gritd runs", description="The runs of a folder, a line each.")
     parser.add_argument(
         "folder", nargs="?", type=Path, default=Path("runs"), metavar="DIR", help="default: runs"

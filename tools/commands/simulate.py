@@ -49,7 +49,7 @@ MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.9 kB a s
 
 def main(argv: Sequence[str]) -> int:
     """Simulate, write the recording and its truth. Raises ConfigError or CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     configuration = config.load(arguments.config)
 
     settings, soil = (
@@ -136,7 +136,7 @@ def _check_length(what: Path, seconds: float, rate: float) -> None:
         raise CommandError(f"{what}: found {length}; expected at most {longest}", USAGE)
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd simulate",
         description="Simulate a run with Eqs. (1)-(10) and the effects; write its recording.",

@@ -52,14 +52,14 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0 where a healthy daemon answers; 1 where none does, one of its threads hangs, or the
     filter has not been fed for a second.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     with connected(arguments.socket) as connection:
         report = next(reports(connection))
     print(_text(arguments, report), flush=True)
     return DONE if report["healthy"] else FAILED
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(prog="gritd status", description="One report of the running daemon.")
     add_socket(parser)
     form = parser.add_mutually_exclusive_group()

@@ -1,6 +1,11 @@
-"""The commands of `gritd`: each a module with `main(argv)` that gives the exit code."""
+"""The commands of `gritd`: each a module with `main(argv)`, which gives the exit code, and
+`build_parser()`.
+"""
 
 from __future__ import annotations
+
+import importlib
+from argparse import ArgumentParser
 
 # command -> (module, what it does)
 COMMANDS = {
@@ -73,3 +78,9 @@ COMMANDS = {
     ),
     "completion": ("gritd.tools.commands.completion", "the shell completes commands and options"),
 }
+
+
+def parser_of(command: str) -> ArgumentParser:
+    """The options of a command, without running it."""
+    parser: ArgumentParser = importlib.import_module(COMMANDS[command][0]).build_parser()
+    return parser

@@ -32,7 +32,7 @@ EXPECTED = "expected a first line of 16 characters or more, as openssl rand -hex
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0 after SIGTERM or Ctrl-C. Raises CommandError."""
-    arguments = _parser().parse_args(argv)
+    arguments = build_parser().parse_args(argv)
     for package in NEEDS:
         require(package, "gritd view")
     if arguments.foxglove is not None:
@@ -161,7 +161,7 @@ def _token(arguments: Namespace) -> str:
     return token
 
 
-def _parser() -> Parser:
+def build_parser() -> Parser:
     parser = Parser(
         prog="gritd view", description="Show the running daemon, or recordings, in a browser."
     )

@@ -1,5 +1,6 @@
 """What `gritd view` costs the daemon beside it, in one run on wires: without a view, with one, with
-browsers, attacked, frozen, killed. Then the memory of a view over an hour of reports sent faster.
+streams, with browsers (where Chromium is installed), attacked, frozen, killed. Then the memory of a
+view over an hour of reports sent faster.
 
 python -m gritd.tools.dev.view_cost [--seconds 30] [--browsers 20] [--clients 1000] [--hours 1]
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import os
 import resource
+import shutil
 import signal
 import socket
 import subprocess
@@ -37,6 +39,15 @@ from gritd.tools.view.history import LONGEST, RATE
 READY = 120.0  # [s] the longest that a process may take to start
 SETTLED = 5.0  # [s] of a stretch before it counts
 SPARE = 60.0  # [s] that the testbed plays longer
+STARTING = 1.0  # [s] a browser takes to show the page
+CHROMIUM = shutil.which("chromium")
+OPTIONS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--remote-debugging-port=0",
+)
 FASTER = 25.0  # times that an hour of reports is sent faster
 HEAD = "GET {} HTTP/1.1\r\nHost: {}\r\n"
 KINDS = (
@@ -66,7 +77,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print two tables."""
     parser = Parser(prog="python -m gritd.tools.dev.view_cost", description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="of each stretch; default 30")
-    parser.add_argument("--browsers", type=int, default=20, help="streams followed; default 20")
+    parser.add_argument(
+        "--browsers", type=int, default=20, help="streams, and browsers; default 20"
+    )
     parser.add_argument("--clients", type=int, default=1000, help="that attack; default 1000")
     parser.add_argument("--hours", type=float, default=1.0, help="of reports; default 1, 0: none")
 
@@ -85,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def on_wires(folder: Path, arguments: Namespace, stop: StopRequest) -> dict[str, Any]:
     """One run with its stretches; a report of the daemon."""
-    seconds = 7 * (arguments.seconds + SETTLED) + SPARE
+    seconds = 8 * (arguments.seconds + SETTLED) + SPARE
     told = ["--seconds", str(seconds), "--folder", str(folder), "--wait"]
 
     with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
@@ -126,6 +139,9 @@ def _stretches(
         yield during("view, no browser", view)
         yield during("1 stream", view, lambda: _followed(port))
         yield during(f"{browsers} streams", view, following)
+        if CHROMIUM:
+            with _looking(port, browsers, folder):
+                yield during(f"{browsers} browsers on this machine", view)
         yield during(f"{clients} clients attack", view, attacking)
         os.kill(view.pid, signal.SIGSTOP)
         yield during("view frozen", view)
@@ -142,6 +158,28 @@ def _viewing(path: Path, stop: StopRequest) -> Iterator[tuple[Child, int]]:
     finally:
         with suppress(Exception):  # killed
             view.stop()
+
+
+@contextmanager
+def _looking(port: int, count: int, folder: Path) -> Iterator[None]:
+    """Browsers that show the page, at the lowest priority: they belong on other computers."""
+    address = f"http://127.0.0.1:{port}/"
+    started = [
+        subprocess.Popen(
+            ("nice", "-n", "19", str(CHROMIUM), *OPTIONS, f"--user-data-dir={folder}/{n}", address),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for n in range(count)
+    ]
+    try:
+        time.sleep(STARTING * count)
+        yield
+    finally:
+        for each in started:
+            each.terminate()
+        for each in started:
+            each.wait()
 
 
 async def _during(

@@ -56,7 +56,7 @@ def main(argv: Sequence[str]) -> int:
         configuration.settings,
         soil_of(configuration.settings, _soil_changes(arguments.soil)),
     )
-    acting = _acting(settings, arguments.effect)
+    acting = acting_effects(settings, arguments.effect)
 
     vacant(arguments.output)
     motion, info = _motion(arguments, configuration)
@@ -187,7 +187,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
+def acting_effects(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
     """Configured effects that act on the testbed, with the values of the command line in their
     place.
     """

@@ -10,6 +10,7 @@ from argparse import ArgumentParser
 # command -> (module, what it does)
 COMMANDS = {
     "init": ("gritd.tools.commands.init", "a folder to work in: configuration and CAN messages"),
+    "example": ("gritd.tools.commands.example", "a small simulated campaign to try the others on"),
     "calibrate": (
         "gritd.tools.commands.calibrate",
         "scale and offset of a sensor from known values, into the configuration",

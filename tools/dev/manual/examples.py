@@ -16,11 +16,13 @@ class Example:
 EXAMPLES = {
     "init": Example(("gritd init bench",)),
     "check-config": Example(("gritd check-config bench/testbed.yaml",)),
+    "example": Example(("gritd example campaign",)),
     "estimate": Example(("gritd estimate campaign/run-*.mcap",)),
     "report": Example(("gritd report campaign/run-*.mcap -o report.html",)),
     "diagnose": Example(
         (
-            "gritd diagnose campaign/run-*.mcap --quick"
+            "gritd example losses --effect coulomb_friction.loss=0.05",
+            "gritd diagnose losses/run-*.mcap --config losses/testbed.yaml --quick"
             " --report diagnosis.html --apply explained.yaml",
         )
     ),
@@ -28,13 +30,13 @@ EXAMPLES = {
         ("gritd compare campaign/run-*.mcap --config campaign/testbed.yaml --report compare.html",)
     ),
     "runs": Example(("gritd runs campaign --sort load",)),
-    "info": Example(("gritd info campaign/run-1.mcap",)),
-    "replay": Example(("gritd replay campaign/run-1.mcap",)),
-    "diff": Example(("gritd diff campaign/run-1.mcap campaign/run-2.mcap",)),
-    "export": Example(("gritd export campaign/run-1.mcap --csv -o tables",)),
+    "info": Example(("gritd info campaign/run-070N.mcap",)),
+    "replay": Example(("gritd replay campaign/run-070N.mcap",)),
+    "diff": Example(("gritd diff campaign/run-040N.mcap campaign/run-070N.mcap",)),
+    "export": Example(("gritd export campaign/run-070N.mcap --csv -o tables",)),
     "recover": Example(
         (
-            "head -c 100000 campaign/run-1.mcap > broken.mcap",
+            "head -c 100000 campaign/run-070N.mcap > broken.mcap",
             "gritd recover broken.mcap",
         )
     ),

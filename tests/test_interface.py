@@ -13,6 +13,7 @@ import pytest
 
 import gritd
 from gritd.config import packaged
+from gritd.estimator.recording import tables
 
 STEPS = [
     {"duration": 5.0, "load": load, "slip": slip, "speed": 0.02}
@@ -81,6 +82,17 @@ def test_a_recording_and_its_arrays_agree(simulated, recorded):
     }
     assert np.array_equal(own["motor_shunt"][1], simulated.arrays["motor_shunt"][1])
     assert [each.path for each in gritd.read([recorded, recorded])] == [recorded, recorded]
+
+
+def test_every_topic_of_a_run_is_what_a_pass_for_it_alone_gives(recorded, monkeypatch):
+    at_once = gritd.read(recorded)
+    monkeypatch.setattr(tables, "ROOM", 0)
+    one_by_one = gritd.read(recorded)
+    assert sorted(at_once) == sorted(one_by_one) != []
+    for topic in at_once:
+        np.testing.assert_array_equal(at_once[topic], one_by_one[topic])
+        at_once[topic]["log_time"] += 1  # they are the caller's
+        one_by_one[topic]["log_time"] += 1
 
 
 def test_a_run_after_another_on_the_same_bed_knows_more(simulated):

@@ -103,10 +103,15 @@ class Recording:
         """
         return self.tables({topic: None})[topic]
 
+    def own_tables(self) -> None:
+        """Nobody else has the arrays that `read` has made: they may be written to."""
+        for rows in self._tables.values():
+            rows.flags.writeable = True
+
     def tables(self, wanted: Mapping[str, Fields]) -> dict[str, Rows]:
         """Several topics at once, each as `arrays` gives it, shape (n,) by topic, in one pass over
         the file; of its fields the named ones, or all for None. The arrays are read-only where
-        `read` was told of the same topic and fields: they were made then. Raises RecordingError.
+        `read` was asked for the same topic and fields: they were made then. Raises RecordingError.
         """
         known = {topic: self._known(topic) for topic in wanted}
         made = {

@@ -52,13 +52,14 @@ MAX_PREAMBLES = 1000  # a recording of ours has a few: which channels a chunk ho
 def read(
     path: Path | str,
     topics: Iterable[Topic] = RAW_TOPICS,
-    tables: Mapping[str, Fields] = NOTHING,
+    tables: Mapping[str, Fields] | None = NOTHING,
 ) -> Recording:
     """Open a recording and check all of it.
 
     `topics` are those whose fields the caller relies on; all others are taken as the file defines
     them. `tables` are what `Recording.tables` will be asked for: made in the same pass, a long file
-    is unpacked once. Raises RecordingError if there is no such file, it is no MCAP file, or one of
+    is unpacked once. None stands for all fields of all topics of an index, unless it is a very long
+    file. Raises RecordingError if there is no such file, it is no MCAP file, or one of
     `topics` lacks a field in it.
     """
     path = Path(path)
@@ -149,7 +150,7 @@ class RecordingCheck:
         self._preamble = b""  # the last of them
         self._line = 0  # where the next line of damage belongs
         self._waste = 0
-        self._kept_room = 0 if tables.wanted else MAX_KEPT  # who has the arrays asks no more
+        self._kept_room = MAX_KEPT
         self._unpacked = self._stored = self._chunks = self._messages = 0
 
     def whole(self, file: BinaryIO, walk: Walk) -> LogTimes:
@@ -159,6 +160,9 @@ class RecordingCheck:
         walk.begin()
         expected = self._summary(contents.summary)
         self._expect(expected, walk.size)
+        self._tables.begin(recording.sources)
+        if self._tables.wanted:  # who has the arrays asks no more
+            self._kept_room = 0
 
         for pile in _piles(walk, contents.damage):
             self._numbered = contents.library == LIBRARY

@@ -21,6 +21,7 @@ from gritd.estimator.recording.message_records import MESSAGE_HEAD, Starts, gath
 
 Fields = tuple[str, ...] | None  # of a topic; None for all of them
 NOTHING: Mapping[str, Fields] = MappingProxyType({})
+ROOM = 256 << 20  # [bytes] of tables that are made though nobody has asked for one yet
 KEYS = [("log_time", "<i8"), ("order", "<i8")]  # what a row begins with
 
 
@@ -140,13 +141,27 @@ class Table:
 
 
 class Tables:
-    """Those that are asked for, by topic. A topic whose messages have no fixed size is left out."""
+    """Those that are asked for, by topic; None: all. A topic whose messages have no fixed size is
+    left out.
+    """
 
-    def __init__(self, wanted: Mapping[str, Fields]) -> None:
-        self.wanted = wanted
+    def __init__(self, wanted: Mapping[str, Fields] | None) -> None:
+        self.all = wanted is None
+        self.wanted = wanted or NOTHING
         self.expected = Counter[str]()  # how many messages of each topic there should be
         self.refused = set[str]()  # topics of which a channel lacks a field
         self._tables: dict[str, Table] = {}
+
+    def begin(self, sources: Mapping[int, Source]) -> None:
+        """Once it is known which topics there are, and how many messages of each: all are made if
+        they fit in ROOM.
+        """
+        if not self.all:
+            return
+        topics = {s.topic.name: s.topic for s in sources.values() if s.codec and s.topic.codec.flat}
+        sizes = (self.expected[n] * Table(t, None).dtype.itemsize for n, t in topics.items())
+        if sum(sizes) <= ROOM:
+            self.wanted = dict.fromkeys(topics)
 
     def add(self, chunk: Chunk, sources: Mapping[int, Source], before: int) -> None:
         """The messages of a chunk that `before` messages of the file stand before."""

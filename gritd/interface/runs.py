@@ -54,9 +54,11 @@ class Run(Mapping[str, Table]):
         return None if text is None else loads(text, f"{self.path}: gritd.config")
 
     def __getitem__(self, topic: str) -> Table:
-        if topic not in set(self):
+        name = f"/{topic.lstrip('/')}"
+        known = self.recording.topics.get(name)
+        if known is None or not known.codec.flat or not self.recording.counts[name]:
             raise KeyError(topic)
-        return self.recording.arrays(f"/{topic.lstrip('/')}")
+        return self.recording.arrays(name)
 
     def __iter__(self) -> Iterator[str]:
         flat = (topic for topic in self.recording.topics.values() if topic.codec.flat)
@@ -102,8 +104,15 @@ def read(files: Place | Sequence[Place]) -> Run | list[Run]:
     ('log_time', 'order', 'stamp', 'volts')
     """
     if isinstance(files, str | PathLike):
-        return Run(read_recording(Path(files)))
-    return [Run(read_recording(Path(file))) for file in files]
+        return _run(Path(files))
+    return [_run(Path(file)) for file in files]
+
+
+def _run(path: Path) -> Run:
+    """Its tables belong to the caller, who may write to them."""
+    recording = read_recording(path, tables=None)
+    recording.own_tables()
+    return Run(recording)
 
 
 def configured(config: Place | Configuration) -> Configuration:

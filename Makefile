@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs man proof scenarios coverage fuzz soak install uninstall lock wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall lock wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -54,6 +54,13 @@ docs: $(READY) ## the generated parts of the documents
 
 man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
 	@$(BIN)/python -m gritd.tools.dev.manual build/man
+
+site: $(READY) ## build/site: the documents as a site, to open from the folder; its examples run, a minute or two
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
+	@rm -rf docs/site/commands build/site
+	@$(BIN)/python -m gritd.tools.dev.manual --site docs/site/commands
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
+	@echo "build/site/index.html"
 
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes docs/real-recordings.md
 	@$(BIN)/python -m gritd.tools.proof.real

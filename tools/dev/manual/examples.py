@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Example:
-    """Lines for a shell, and whether the site shows what they print."""
+    """Lines for a shell, and how the site gets what they print."""
 
     lines: tuple[str, ...]
-    runs: bool = True
+    before: str = ""  # what they need, in the same folder; DOCS is that of the documents
+    during_demo: bool = False  # they need a daemon: that of the example of `demo`
+    seconds: float | None = None  # Ctrl-C ends it then
+    code: int = 0  # with which it may end, beside 0
+    shown: str = ""  # where they run for minutes: the page that has what they print
 
 
 EXAMPLES = {
@@ -31,14 +35,15 @@ EXAMPLES = {
     ),
     "runs": Example(("gritd runs campaign --sort load",)),
     "info": Example(("gritd info campaign/run-070N.mcap",)),
-    "replay": Example(("gritd replay campaign/run-070N.mcap",)),
+    "replay": Example(("gritd replay campaign/run-070N.mcap -o replayed.mcap",)),
     "diff": Example(("gritd diff campaign/run-040N.mcap campaign/run-070N.mcap",)),
     "export": Example(("gritd export campaign/run-070N.mcap --csv -o tables",)),
     "recover": Example(
         (
-            "head -c 100000 campaign/run-070N.mcap > broken.mcap",
+            "head -c 800000 campaign/run-070N.mcap > broken.mcap",
             "gritd recover broken.mcap",
-        )
+        ),
+        code=3,
     ),
     "simulate": Example(
         (
@@ -48,26 +53,29 @@ EXAMPLES = {
     ),
     "effects": Example(("gritd effects bulldozing",)),
     "bed": Example(("gritd bed --directory runs new sand-may", "gritd bed --directory runs")),
-    "demo": Example(("gritd demo --seconds 10",)),
+    "demo": Example(("gritd demo --seconds 12",)),
     "reproduce": Example(("gritd reproduce --simulations 2000",)),
     "calibrate": Example(
-        ("gritd calibrate pot --config bench/testbed.yaml --known '0, 10, 20, 50 mm' --in-place",),
-        runs=False,
+        (
+            "gritd calibrate pot --config bench/testbed.yaml --from pot.mcap"
+            " --known '0, 10, 20, 50 mm' --known-sigma '0.02 mm' --in-place",
+        ),
+        before="cp $DOCS/first-day/bench.py . && python bench.py",
     ),
-    "run": Example(
-        ("gritd run --config bench/testbed.yaml --name sand-70N --load 70",), runs=False
-    ),
-    "status": Example(("gritd status --json",), runs=False),
-    "monitor": Example(("gritd monitor",), runs=False),
-    "view": Example(("gritd view campaign/run-*.mcap",), runs=False),
     "import": Example(
         (
-            "gritd import series runs/*.csv --guess > map.yaml",
-            "gritd import series runs/*.csv --map map.yaml -o out",
+            "gritd import series spreadsheet/*.csv --guess",
+            "gritd import series spreadsheet/*.csv --map spreadsheet.yaml -o out",
         ),
-        runs=False,
+        before="cp $DOCS/your-data/*.py $DOCS/your-data/*.yaml . && python strangers.py",
     ),
-    "prove": Example(("gritd prove --cases 2 --seed 1",), runs=False),
-    "bench": Example(("gritd bench",), runs=False),
-    "completion": Example(('eval "$(gritd completion bash)"',), runs=False),
+    "run": Example(
+        ("gritd run --config bench/testbed.yaml --name sand-70N --load 70",), seconds=4.0, code=130
+    ),
+    "view": Example(("gritd view replayed.mcap",), seconds=4.0, code=130),
+    "status": Example(("gritd status",), during_demo=True),
+    "monitor": Example(("gritd monitor --once",), during_demo=True),
+    "completion": Example(("gritd completion bash | head -n 8",)),
+    "prove": Example(("gritd prove --cases 20 --seed 1",), shown="proof"),
+    "bench": Example(("gritd bench",), shown="performance"),
 }

@@ -26,7 +26,7 @@ def section(proof: Proof, finding: Finding, commands: Sequence[str], seconds: fl
 def _lines(
     proof: Proof, finding: Finding, commands: Sequence[str], seconds: float
 ) -> Iterator[str]:
-    yield f"### {proof.title}"
+    yield f"## {proof.title}"
     yield ""
 
     yield f"**Concealed.** {flowing(proof.concealed)}"

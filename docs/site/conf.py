@@ -21,6 +21,7 @@ external_toc_path = "site/toc.yml"
 external_toc_exclude_missing = True
 exclude_patterns = ["effects/*", "site/*.py"]
 highlight_language = "none"
+smartquotes = False  # "--option" stays as it is
 
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4

@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall lock wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall lock wheel deb clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -21,6 +21,8 @@ $(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
 	@echo "setting up $(VENV) (a minute or two, once) …"
 	@$(PYTHON) -m venv --upgrade $(VENV) || { echo "cannot make a venv; is the package python3-venv installed?" >&2; exit 1; }
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[test]'
+	@ls estimator/compiled/*.so >/dev/null 2>&1 || \
+	  echo "nothing was compiled, and a tick takes longer; for Debian's Python: apt install gcc python3-dev; rm $@" >&2
 	@touch $@
 
 demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
@@ -90,6 +92,9 @@ wheel: $(READY) ## dist/gritd-….whl
 	@rm -rf build/lib* build/bdist*  # setuptools packs what an earlier build left there
 	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir dist .
 	@ls dist/*.whl
+
+deb: ## dist/gritd_….deb for the Debian release of this computer
+	@tools/debian/build
 
 clean: ## remove what the targets made
 	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

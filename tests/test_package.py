@@ -21,7 +21,12 @@ ROOT = Path(__file__).parents[1]
 SOURCES = ("gritd", "estimator", "drivers", "config", "tools")
 PAGES = ("pyproject.toml", "README.md", "LICENSE")
 OF_THE_CHECKOUT = {"gritd/config/requirements.lock", "gritd/tools/install", "gritd/tools/lock"}
-DEVELOPMENT = ("gritd/tools/debian", "gritd/tools/dev", "gritd/tools/proof/ours", "gritd/tools/proof/real")
+DEVELOPMENT = (
+    "gritd/tools/debian",
+    "gritd/tools/dev",
+    "gritd/tools/proof/ours",
+    "gritd/tools/proof/real",
+)
 
 # a folder of the user's, with packages that have the names of our folders
 FOREIGN = ("tools", "config", "drivers", "estimator")

@@ -15,7 +15,7 @@ from typing import Any
 
 from gritd.drivers.can_libraries import can
 from gritd.drivers.errors import DeviceError
-from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, Accepted, pack
+from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, AcceptedIdentifiers, pack
 from gritd.drivers.link import POLL, Chunk, Clock
 from gritd.drivers.port import Port
 from gritd.drivers.port_lock import held
@@ -84,7 +84,7 @@ class CanLink:
             if self._device.interface == "socketcan":
                 return Port(bus.fileno()), of_kernel
             if self._device.interface == "slcan":
-                return Port(bus.fileno()), SlcanLines(Accepted(self._filters)).decode
+                return Port(bus.fileno()), SlcanLines(AcceptedIdentifiers(self._filters)).decode
         return None
 
     def read(self) -> Chunk | None:

@@ -38,7 +38,7 @@ MOVED = 1e6  # [ns] an edge this far from the one before is another one
 STRAY = 10e6  # [ns] what comes earlier than this was not held up by the way: its time is wrong
 
 
-class Line:
+class ClockLine:
     """Offset of our clock over the device's, as a function of the device time.
 
     Until it is `settled`, it follows the lowest points at once: the first frames may have waited

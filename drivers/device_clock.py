@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from statistics import median
 
-from gritd.drivers.clock_line import STRAY, Line
+from gritd.drivers.clock_line import STRAY, ClockLine
 from gritd.drivers.clock_step import FLAT, Doubt, Rival
 
 LATE = 20e6  # [ns] longer than a USB adapter holds a frame back
@@ -34,7 +34,7 @@ class DeviceClock:
         self.step = 0.0  # how far, the last time [s]
         self.restarts = 0  # times it began at zero: the device was switched on
         self._modulus = modulus_us * 1000
-        self._line = Line()
+        self._line = ClockLine()
         self._seen: list[int] = []  # the two latest device times, late or not
         self._start(0, 0)
         self.restart()
@@ -89,7 +89,7 @@ class DeviceClock:
         self._newest = self._second = time  # the two latest that came without much delay
         self._newest_received = received
         self._seen = [time, time]
-        self._line = Line(self._line.slope)
+        self._line = ClockLine(self._line.slope)
         self._doubt = Doubt()
 
     def _judged(self, times: list[int], received: int) -> list[bool]:

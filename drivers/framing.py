@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
 
 @dataclass
-class Counts:
+class FramingCounts:
     """Since the framing was created. Every byte fed in is in a good frame, in garbage, or still
     pending.
     """
@@ -47,7 +47,7 @@ class Counts:
 class Framing(Protocol):
     """Chunks of bytes in, frames out."""
 
-    counts: Counts
+    counts: FramingCounts
 
     @property
     def hint(self) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 
-from gritd.drivers.framing import KEY, MAX_VALUES, Counts, FieldValue, Frame, SequenceGap
+from gritd.drivers.framing import KEY, MAX_VALUES, FieldValue, Frame, FramingCounts, SequenceGap
 
 SEQUENCE_MODULUS = 1 << 16
 CLOCK_MODULUS = 1 << 32  # [µs]
@@ -39,7 +39,7 @@ class AsciiFraming:
     hint = ""
 
     def __init__(self) -> None:
-        self.counts = Counts()
+        self.counts = FramingCounts()
         self._pending = b""
         self._gap = SequenceGap(SEQUENCE_MODULUS)
 

@@ -23,7 +23,7 @@ from typing import NoReturn
 
 from gritd.drivers.can_libraries import Database, Message, Signal, cantools
 from gritd.drivers.errors import DeviceSettingsError
-from gritd.drivers.framing import Counts, FieldValue, Frame, SequenceGap
+from gritd.drivers.framing import FieldValue, Frame, FramingCounts, SequenceGap
 
 EXTENDED = 1 << 31
 REMOTE = 1 << 30
@@ -111,7 +111,7 @@ class CanFraming:
     """
 
     def __init__(self, device: str, database: Database, keys: Iterable[str]) -> None:
-        self.counts = Counts()
+        self.counts = FramingCounts()
         self._device = device
         self._database = database
         self._wanted: dict[int, _Wanted] = {}
@@ -268,7 +268,7 @@ def _filter(message: Message) -> dict[str, int | bool]:
     return {"can_id": message.frame_id, "can_mask": mask, "extended": extended}
 
 
-class Accepted:
+class AcceptedIdentifiers:
     """The identifiers, with their flags, that acceptance filters let pass: for a link that has to
     do it itself.
     """

@@ -19,7 +19,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 
-from gritd.drivers.framing import KEY, MAX_VALUES, Counts, Frame, SequenceGap
+from gritd.drivers.framing import KEY, MAX_VALUES, Frame, FramingCounts, SequenceGap
 
 SEQUENCE_MODULUS = 1 << 16
 CLOCK_MODULUS = 1 << 32  # [µs]
@@ -88,7 +88,7 @@ class CobsFraming:
     hint = ""
 
     def __init__(self) -> None:
-        self.counts = Counts()
+        self.counts = FramingCounts()
         self._pending = b""
         self._overlong = False
         self._gap = SequenceGap(SEQUENCE_MODULUS)

@@ -13,7 +13,7 @@ from gritd.estimator.messages.readings import WRENCH_FIELDS, Value
 FORCES = 3  # fx fy fz come before tx ty tz
 
 
-class Wrench(Sensor):
+class WrenchSensor(Sensor):
     """fx fy fz [N], tx ty tz [N·m], from one frame or from several of the same cycle.
 
     `signal` names the frames, joined by `+`, in the order in which their values make up the six.

@@ -261,7 +261,7 @@ static int numbers(PyObject *const *arguments, Py_ssize_t given, Py_ssize_t want
 
 PyDoc_STRVAR(predict_doc,
 "predict(c, tan_phi, k, theta_1, slip, load, exponent, c1, c2)\n--\n\n"
-"T, DP and resistance with gradients, each a Quantity; None where the general form is to answer.");
+"T, DP and resistance with gradients, each a PredictedQuantity; None where the general form is to answer.");
 
 static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_t given) {
     Closed *self = (Closed *)object;

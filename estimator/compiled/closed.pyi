@@ -1,11 +1,11 @@
-from gritd.estimator.filter.model import Quantity
+from gritd.estimator.filter.model import PredictedQuantity
 
 Range = tuple[float, float]
 
 class Closed:
     def __init__(
         self,
-        quantity: type[Quantity],
+        quantity: type[PredictedQuantity],
         wheel: tuple[float, float, float, float],  # r [m], b [m], c₁, c₂
         ln_k: float,  # at which the table was made
         theta_1: Range,  # of the table [rad]
@@ -25,7 +25,7 @@ class Closed:
         c1: float,
         c2: float,
         /,
-    ) -> tuple[Quantity, Quantity, Quantity] | None: ...
+    ) -> tuple[PredictedQuantity, PredictedQuantity, PredictedQuantity] | None: ...
     def load(
         self,
         c: float,

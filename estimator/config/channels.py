@@ -8,7 +8,7 @@ from math import inf
 from typing import Any
 
 from gritd.estimator.config.devices import NAME
-from gritd.estimator.config.kinds import UNLIMITED, Integer, Interval, Quantity, Text
+from gritd.estimator.config.kinds import UNLIMITED, Integer, Interval, NumberWithUnit, Text
 from gritd.estimator.config.schema import ABSENT, NEEDED, Impossible, Key, Section, uncertain
 from gritd.estimator.config.settings import (
     Calibration,
@@ -83,10 +83,14 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
 def _timing() -> dict[str, Key]:
     return {
         "latency": Key(
-            Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"
+            NumberWithUnit("s", low=0, high=1),
+            "a sample is older than its stamp by this much",
+            "0 ms",
         ),
         "stale_after": Key(
-            Quantity("s", above=0, high=10), "silence after which the channel is stale", "40 ms"
+            NumberWithUnit("s", above=0, high=10),
+            "silence after which the channel is stale",
+            "40 ms",
         ),
     }
 
@@ -105,10 +109,12 @@ def _channel(name: str) -> Section:
     keys = _source() | (
         _calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED)
     )
-    keys["noise"] = Key(Quantity(step, above=LEAST_NOISE), "standard deviation of one reading")
+    keys["noise"] = Key(
+        NumberWithUnit(step, above=LEAST_NOISE), "standard deviation of one reading"
+    )
 
     if name in ENCODERS:
-        max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
+        max_rate = NumberWithUnit(f"{step}/s", above=0, unlimited=True)
         keys["range"] = Key(
             Unlimited((-inf, inf), "no count is impossible, max_rate tells a jump"),
             "none",
@@ -119,7 +125,7 @@ def _channel(name: str) -> Section:
             Integer(2, 1 << 64), "counts at which it wraps, where that is not 2^bits", ABSENT
         )
         keys["resolution"] = Key(
-            Quantity("", above=0),
+            NumberWithUnit("", above=0),
             "what one count is in the number sent, where turns, degrees or a scaled number are",
             ABSENT,
         )
@@ -127,7 +133,9 @@ def _channel(name: str) -> Section:
             max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED
         )
     else:
-        keys["range"] = Key(Interval(Quantity(raw)), "valid readings; one outside is quarantined")
+        keys["range"] = Key(
+            Interval(NumberWithUnit(raw)), "valid readings; one outside is quarantined"
+        )
         keys["max_rate"] = Key(
             Unlimited(inf, "only an encoder's counts can jump"), "none", UNLIMITED
         )
@@ -164,12 +172,14 @@ WRENCH = {
     "torque": Key(
         Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"
     ),
-    "force_noise": Key(Quantity("N", above=LEAST_NOISE), "standard deviation of one force reading"),
-    "torque_noise": Key(
-        Quantity("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"
+    "force_noise": Key(
+        NumberWithUnit("N", above=LEAST_NOISE), "standard deviation of one force reading"
     ),
-    "max_force": Key(Quantity("N", above=0), "a larger force is quarantined", "10 kN"),
-    "max_torque": Key(Quantity("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
+    "torque_noise": Key(
+        NumberWithUnit("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"
+    ),
+    "max_force": Key(NumberWithUnit("N", above=0), "a larger force is quarantined", "10 kN"),
+    "max_torque": Key(NumberWithUnit("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
 }
 
 

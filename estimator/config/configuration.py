@@ -19,7 +19,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.config.table import table
 from gritd.estimator.config.yamltree import (
     ConfigError,
-    Place,
+    FilePosition,
     compose,
     dumped,
     is_ended,
@@ -71,7 +71,9 @@ def whole_text(path: Path) -> str:
     text = read_text(path)
     compose(text, str(path))
     if not is_ended(text):
-        raise Place(str(path), text.count("\n") + 1, "").error("no end", "'...' as the last line")
+        raise FilePosition(str(path), text.count("\n") + 1, "").error(
+            "no end", "'...' as the last line"
+        )
     return text
 
 

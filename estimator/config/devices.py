@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gritd.estimator.config.kinds import Choice, FilePath, Flag, Integer, Quantity, Text
+from gritd.estimator.config.kinds import Choice, FilePath, Integer, NumberWithUnit, Text, YesNo
 from gritd.estimator.config.schema import ABSENT, Impossible, Key, Named, Options, Section, Variant
 from gritd.estimator.config.settings import Device
 
@@ -33,11 +33,11 @@ SIGNAL = {
     "start": Key(Integer(0, 511), "start bit, as in a DBC"),
     "length": Key(Integer(1, 64), "bits"),
     "byte_order": Key(Choice(("little_endian", "big_endian")), "default little_endian", ABSENT),
-    "signed": Key(Flag(), "default false", ABSENT),
-    "is_float": Key(Flag(), "IEEE 754, default false", ABSENT),
-    "extended": Key(Flag(), "29-bit frame id, default false", ABSENT),
-    "scale": Key(Quantity(""), "value = bits · scale + offset; default 1", ABSENT),
-    "offset": Key(Quantity(""), "default 0", ABSENT),
+    "signed": Key(YesNo(), "default false", ABSENT),
+    "is_float": Key(YesNo(), "IEEE 754, default false", ABSENT),
+    "extended": Key(YesNo(), "29-bit frame id, default false", ABSENT),
+    "scale": Key(NumberWithUnit(""), "value = bits · scale + offset; default 1", ABSENT),
+    "offset": Key(NumberWithUnit(""), "default 0", ABSENT),
 }
 
 

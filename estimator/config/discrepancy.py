@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gritd.estimator.config.kinds import Choice, Interval, Quantity
+from gritd.estimator.config.kinds import Choice, Interval, NumberWithUnit
 from gritd.estimator.config.schema import ABSENT, Impossible, Key, Section
-from gritd.estimator.config.yamltree import Node, Sequence, describe
+from gritd.estimator.config.yamltree import Node, YamlSequence, describe
 from gritd.estimator.model.correction import Correction
 from gritd.estimator.model.discrepancy import CONDITIONS
 from gritd.estimator.model.learnt import (
@@ -30,10 +30,10 @@ TRAVELS = ("forward", "backward", "both")
 
 
 @dataclass(frozen=True)
-class Numbers:
+class NumberList:
     """A list of plain numbers."""
 
-    number: Quantity
+    number: NumberWithUnit
     least: int
     most: int
     of: str = "numbers"
@@ -44,16 +44,16 @@ class Numbers:
         return f"a list of {count} {self.of}"
 
     def read(self, node: Node) -> tuple[Vector, Node]:
-        if not isinstance(node, Sequence) or not self.least <= len(node.items) <= self.most:
+        if not isinstance(node, YamlSequence) or not self.least <= len(node.items) <= self.most:
             raise node.place.error(describe(node), self.expected)
         return tuple([self.number.read(item)[0] for item in node.items]), node
 
 
 @dataclass(frozen=True)
-class Rows:
+class NumberRows:
     """A list of lists of plain numbers."""
 
-    row: Numbers
+    row: NumberList
     least: int
     most: int
     of: str
@@ -63,35 +63,37 @@ class Rows:
         return f"a list of {self.least} to {self.most} {self.of}, each {self.row.expected}"
 
     def read(self, node: Node) -> tuple[tuple[Vector, ...], Node]:
-        if not isinstance(node, Sequence) or not self.least <= len(node.items) <= self.most:
+        if not isinstance(node, YamlSequence) or not self.least <= len(node.items) <= self.most:
             raise node.place.error(describe(node), self.expected)
         return tuple([self.row.read(item)[0] for item in node.items]), node
 
 
-NUMBER = Quantity("", low=-1e3, high=1e3)
-CORRELATION = Quantity("", low=-1, high=1)
-ALONG_POINTS = Numbers(NUMBER, 1, MOST_POINTS, "numbers, one a point")
-ALONG_DIRECTIONS = Numbers(CORRELATION, 0, MOST_DIRECTIONS, "correlations, one a direction")
+NUMBER = NumberWithUnit("", low=-1e3, high=1e3)
+CORRELATION = NumberWithUnit("", low=-1, high=1)
+ALONG_POINTS = NumberList(NUMBER, 1, MOST_POINTS, "numbers, one a point")
+ALONG_DIRECTIONS = NumberList(CORRELATION, 0, MOST_DIRECTIONS, "correlations, one a direction")
 
 DOMAIN = {
-    "slip": Key(Interval(Quantity("", low=-1, high=1)), "slip"),
-    "load": Key(Interval(Quantity("N", above=0)), "load"),
-    "speed": Key(Interval(Quantity("m/s", above=0)), "speed of the rim"),
+    "slip": Key(Interval(NumberWithUnit("", low=-1, high=1)), "slip"),
+    "load": Key(Interval(NumberWithUnit("N", above=0)), "load"),
+    "speed": Key(Interval(NumberWithUnit("m/s", above=0)), "speed of the rim"),
     "travel": Key(Choice(TRAVELS), "which way the wheel went", "forward"),
 }
 
 
 def _channel(unit: str) -> Section:
     keys = {
-        "size": Key(Quantity(unit, above=0), "size s at the usual load: the prior's σ"),
+        "size": Key(NumberWithUnit(unit, above=0), "size s at the usual load: the prior's σ"),
         "mean": Key(ALONG_POINTS, "mean μ, in sizes"),
         "spread": Key(
-            Rows(ALONG_POINTS, 0, MOST_DIRECTIONS, "directions"),
+            NumberRows(ALONG_POINTS, 0, MOST_DIRECTIONS, "directions"),
             "directions in which it is still uncertain, one σ each, in sizes",
             "[]",
         ),
         "rest": Key(
-            Quantity("", low=0, high=1), "σ of what the directions do not hold, in sizes", "0.0"
+            NumberWithUnit("", low=0, high=1),
+            "σ of what the directions do not hold, in sizes",
+            "0.0",
         ),
     }
 
@@ -99,29 +101,29 @@ def _channel(unit: str) -> Section:
 
 
 SOIL = {
-    "cohesion": Key(Quantity("Pa", low=0), "c that was written beside it"),
-    "tan_phi": Key(Quantity("", above=0), "tan φ that was written beside it"),
-    "shear_modulus": Key(Quantity("m", above=0), "k that was written beside it"),
+    "cohesion": Key(NumberWithUnit("Pa", low=0), "c that was written beside it"),
+    "tan_phi": Key(NumberWithUnit("", above=0), "tan φ that was written beside it"),
+    "shear_modulus": Key(NumberWithUnit("m", above=0), "k that was written beside it"),
     "with_cohesion": Key(ALONG_DIRECTIONS, "correlation of c with each direction"),
     "with_tan_phi": Key(ALONG_DIRECTIONS, "correlation of tan φ with each direction"),
     "with_shear_modulus": Key(ALONG_DIRECTIONS, "correlation of k with each direction"),
     "among": Key(
-        Numbers(CORRELATION, 3, 3, "correlations"),
+        NumberList(CORRELATION, 3, 3, "correlations"),
         "correlation of c with tan φ, of c with k, of tan φ with k",
         "[0.0, 0.0, 0.0]",
     ),
 }
 
-POINT = Numbers(NUMBER, len(CONDITIONS), len(CONDITIONS), f"numbers ({', '.join(CONDITIONS)})")
+POINT = NumberList(NUMBER, len(CONDITIONS), len(CONDITIONS), f"numbers ({', '.join(CONDITIONS)})")
 
 DISCREPANCY = {
-    "load": Key(Quantity("N", above=0), "usual load, from which loads count"),
-    "speed": Key(Quantity("m/s", above=0), "usual speed of the rim"),
+    "load": Key(NumberWithUnit("N", above=0), "usual load, from which loads count"),
+    "speed": Key(NumberWithUnit("m/s", above=0), "usual speed of the rim"),
     "domain": Key(
         Section(DOMAIN, Domain), "where it was learnt; outside it goes back to its prior"
     ),
     "points": Key(
-        Rows(POINT, 1, MOST_POINTS, "points"),
+        NumberRows(POINT, 1, MOST_POINTS, "points"),
         "inducing points: conditions, in the lengths over which it changes",
     ),
     "torque": Key(_channel("N*m"), "of the torque at the axle", ABSENT),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from gritd.estimator.config.kinds import Kind, Quantity
+from gritd.estimator.config.kinds import Kind, NumberWithUnit
 from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.config.schema import NEEDED, Key, Named, Section, UncertainQuantity, entries
 from gritd.estimator.config.settings import ConfiguredEffect
@@ -13,7 +13,7 @@ from gritd.estimator.config.yamltree import Mapping as Tree
 from gritd.estimator.config.yamltree import Node
 from gritd.estimator.effects import EFFECTS
 
-EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
+EffectSchema = Callable[[str], Mapping[str, NumberWithUnit] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""
 
 
@@ -37,7 +37,9 @@ class Effects:
     def _parameters(self, name: str, item: Node) -> Kind:
         if self.schema is None:
             return Named(
-                UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters"
+                UncertainQuantity(NumberWithUnit(None)),
+                lambda _, value: value,
+                "a mapping of parameters",
             )
         if (known := self.schema(name)) is None:
             raise item.place.error(

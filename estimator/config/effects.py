@@ -6,18 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gritd.estimator.config.kinds import Quantity
+from gritd.estimator.config.kinds import NumberWithUnit
 from gritd.estimator.config.settings import ConfiguredEffect
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
 
 
-def quantities(name: str) -> dict[str, Quantity] | None:
+def quantities(name: str) -> dict[str, NumberWithUnit] | None:
     """How each parameter of an effect is read; None for no such effect."""
     if name not in EFFECTS:
         return None
     return {
-        p.name: Quantity(p.unit, low=p.low if p.stated is None else p.stated, high=p.high)
+        p.name: NumberWithUnit(p.unit, low=p.low if p.stated is None else p.stated, high=p.high)
         for p in EFFECTS[name].parameters()
     }
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gritd.estimator.config import units
-from gritd.estimator.config.yamltree import Node, Scalar, Sequence, describe, shown
+from gritd.estimator.config.yamltree import Node, Scalar, YamlSequence, describe, shown
 
 UNLIMITED = "unlimited"
 
@@ -34,7 +34,7 @@ class Kind(Protocol):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class NumberWithUnit:
     """A number with a unit of the same kind as `unit`; a plain number where `unit` is empty; any
     where it is None.
     """
@@ -106,14 +106,14 @@ class Quantity:
 class Interval:
     """A list of two quantities, the first below the second."""
 
-    quantity: Quantity
+    quantity: NumberWithUnit
 
     @property
     def expected(self) -> str:
         return f"[low, high], each {self.quantity.expected}"
 
     def read(self, node: Node) -> tuple[tuple[float, float], Node]:
-        if not isinstance(node, Sequence) or len(node.items) != 2:
+        if not isinstance(node, YamlSequence) or len(node.items) != 2:
             raise node.place.error(describe(node), self.expected)
         low, high = (self.quantity.read(item)[0] for item in node.items)
         if low >= high:
@@ -143,7 +143,7 @@ class Integer:
 
 
 @dataclass(frozen=True)
-class Flag:
+class YesNo:
     expected: str = "true or false"
 
     def read(self, node: Node) -> tuple[bool, Node]:

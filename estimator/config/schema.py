@@ -14,14 +14,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from gritd.estimator.config import units
-from gritd.estimator.config.kinds import WHOLE, Choice, Kind, Quantity, nearest
+from gritd.estimator.config.kinds import WHOLE, Choice, Kind, NumberWithUnit, nearest
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.config.yamltree import (
+    FilePosition,
     Mapping,
     Node,
-    Place,
     Scalar,
-    Sequence,
+    YamlSequence,
     compose,
     describe,
     shown,
@@ -57,7 +57,7 @@ class Key:
 class UncertainQuantity:
     """A quantity, or a mapping of value and sigma. The plain form has sigma 0."""
 
-    quantity: Quantity
+    quantity: NumberWithUnit
 
     @property
     def expected(self) -> str:
@@ -65,7 +65,7 @@ class UncertainQuantity:
 
     def read(self, node: Node) -> tuple[Uncertain, Node]:
         if not isinstance(node, Mapping):
-            if isinstance(node, Sequence):
+            if isinstance(node, YamlSequence):
                 raise node.place.error(describe(node), self.expected)
             value, _ = self.quantity.read(node)
             return Uncertain(value), node
@@ -73,7 +73,7 @@ class UncertainQuantity:
 
     def mapping(self) -> Section:
         """The form with both."""
-        sigma = Quantity(self.quantity.unit, low=0.0, high=self.quantity.high)
+        sigma = NumberWithUnit(self.quantity.unit, low=0.0, high=self.quantity.high)
         keys = {"value": Key(self.quantity, "value"), "sigma": Key(sigma, "standard deviation")}
         return Section(keys, Uncertain)
 
@@ -94,7 +94,7 @@ class Options:
     def _value(self, node: Node) -> Any:
         if isinstance(node, Mapping):
             return self.read(node)[0]
-        if isinstance(node, Sequence):
+        if isinstance(node, YamlSequence):
             return [self._value(item) for item in node.items]
         return self._scalar(node)
 
@@ -192,18 +192,18 @@ def entries(node: Node, expected: str, known: Iterable[str] | None = None) -> di
     return node.items
 
 
-def default(place: Place, key: Key) -> Node | None:
+def default(place: FilePosition, key: Key) -> Node | None:
     """The node of a key that is not given; None where it may be absent. Raises ConfigError."""
     if key.default == NEEDED:
         raise place.error("nothing", key.kind.expected)
     return None if key.default == ABSENT else _moved(compose(key.default, place.file), place)
 
 
-def _moved(node: Node, place: Place) -> Node:
+def _moved(node: Node, place: FilePosition) -> Node:
     if isinstance(node, Scalar):
         return Scalar(place, node.text, node.tag)
-    if isinstance(node, Sequence):
-        return Sequence(place, tuple(_moved(item, place) for item in node.items))
+    if isinstance(node, YamlSequence):
+        return YamlSequence(place, tuple(_moved(item, place) for item in node.items))
     return Mapping(
         place, {name: _moved(item, place.key(name)) for name, item in node.items.items()}
     )
@@ -223,5 +223,5 @@ def _blame(error: Impossible, section: Mapping) -> Exception:
 
 
 def uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
-    """A quantity with its standard deviation, in the unit and bounds of `Quantity`."""
-    return UncertainQuantity(Quantity(unit, **bounds))
+    """A quantity with its standard deviation, in the unit and bounds of `NumberWithUnit`."""
+    return UncertainQuantity(NumberWithUnit(unit, **bounds))

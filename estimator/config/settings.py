@@ -198,7 +198,7 @@ class BedSettings:
 
 
 @dataclass(frozen=True)
-class Place:
+class BedPosition:
     """Where on the bed a run takes place; from the run's own metadata."""
 
     pass_number: int = 1  # how many times the wheel has gone over this soil, this run included
@@ -228,7 +228,7 @@ class Settings:
     filter: FilterSettings
     logging: Logging
     effects: tuple[ConfiguredEffect, ...] = ()
-    place: Place = Place()
+    place: BedPosition = BedPosition()
     bed: BedSettings = BedSettings()
     peak: PeakPrior = PeakPrior()
     discrepancy: LearntForm | None = None  # what the equations miss on this rig, as it was learnt
@@ -236,7 +236,7 @@ class Settings:
 
 def settings_of_run(settings: Settings, run: RunInfo) -> Settings:
     """The settings of one run: its place on the bed, and its nominal load where it states one."""
-    settings = replace(settings, place=Place(run.pass_number, run.start_position))
+    settings = replace(settings, place=BedPosition(run.pass_number, run.start_position))
     if run.nominal_load is None:
         return settings
     nominal = replace(settings.load.nominal, value=run.nominal_load)

@@ -23,7 +23,7 @@ from gritd.estimator.config.kinds import (
     Either,
     Integer,
     Interval,
-    Quantity,
+    NumberWithUnit,
     Text,
 )
 from gritd.estimator.config.names import EXPECTED, PATTERN
@@ -55,8 +55,8 @@ from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 # ---- wheel, soil, drive, load --------------------------------------------------------------------
 
 WHEEL = {
-    "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
-    "width": Key(Quantity("m", above=0, high=5), "wheel width b"),
+    "radius": Key(NumberWithUnit("m", above=0, high=5), "wheel radius r"),
+    "width": Key(NumberWithUnit("m", above=0, high=5), "wheel width b"),
     "c1": Key(
         uncertain("", low=0, high=1),
         "c₁ of θₘ = (c₁ + c₂ i) θ₁, Eq. (5); the default covers what was measured in sands",
@@ -77,16 +77,16 @@ SOIL = {
     ),
     "shear_modulus": Key(uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
     "exponent": Key(uncertain("", above=0, high=5), "sinkage exponent n"),
-    "k_c": Key(Quantity("Pa/m^(n-1)"), "with `k_phi`, Bekker: σ = (k_c/b + k_φ) zⁿ", ABSENT),
-    "k_phi": Key(Quantity("Pa/m^n"), "with `k_c`", ABSENT),
+    "k_c": Key(NumberWithUnit("Pa/m^(n-1)"), "with `k_phi`, Bekker: σ = (k_c/b + k_φ) zⁿ", ABSENT),
+    "k_phi": Key(NumberWithUnit("Pa/m^n"), "with `k_c`", ABSENT),
     "k1": Key(
-        Quantity("Pa"),
+        NumberWithUnit("Pa"),
         "with `k2`, instead of `k_c` and `k_phi`, Reece, Eq. (1): σ = (k₁ + k₂ b)(z/b)ⁿ",
         ABSENT,
     ),
-    "k2": Key(Quantity("Pa/m"), "with `k1`", ABSENT),
+    "k2": Key(NumberWithUnit("Pa/m"), "with `k1`", ABSENT),
     "modulus_sigma": Key(
-        Quantity("", low=0, high=1), "relative standard deviation of K in σ = K zⁿ", "0.0"
+        NumberWithUnit("", low=0, high=1), "relative standard deviation of K in σ = K zⁿ", "0.0"
     ),
 }
 
@@ -105,7 +105,7 @@ LOAD = {
     "nominal": Key(
         uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"
     ),
-    "minimum": Key(Quantity("N", low=0), "under this load the wheel is in the air", "5 N"),
+    "minimum": Key(NumberWithUnit("N", low=0), "under this load the wheel is in the air", "5 N"),
 }
 
 FORMS = {"bekker": ("k_c", "k_phi"), "reece": ("k1", "k2")}
@@ -156,38 +156,42 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
 
 AUTO = "auto"
 RATES = {
-    "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
+    "tick": Key(NumberWithUnit("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
     "update": Key(
-        Either(AUTO, Quantity("Hz", low=0.01, high=1000)),
+        Either(AUTO, NumberWithUnit("Hz", low=0.01, high=1000)),
         "updates of the filter; its window is 1/update. auto: a window of 0.1 to 3.2 s, as short "
         "as the noise of slip allows",
         AUTO,
     ),
     "horizon": Key(
-        Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"
+        NumberWithUnit("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"
     ),
 }
 
 FILTER = {
     "engine": Key(Choice(ENGINES), "equal to 1e-9; filterpy takes 1 s and 60 MB more", "plain"),
     "cohesion_walk": Key(
-        Quantity("Pa/sqrt(s)", low=0, high=1e6), "random walk of c", "2 Pa/sqrt(s)"
+        NumberWithUnit("Pa/sqrt(s)", low=0, high=1e6), "random walk of c", "2 Pa/sqrt(s)"
     ),
     "tan_phi_walk": Key(
-        Quantity("1/sqrt(s)", low=0, high=10), "random walk of tan φ", "2e-4 1/sqrt(s)"
+        NumberWithUnit("1/sqrt(s)", low=0, high=10), "random walk of tan φ", "2e-4 1/sqrt(s)"
     ),
     "ln_k_walk": Key(
-        Quantity("1/sqrt(s)", low=0, high=10), "random walk of ln k", "1e-4 1/sqrt(s)"
+        NumberWithUnit("1/sqrt(s)", low=0, high=10), "random walk of ln k", "1e-4 1/sqrt(s)"
     ),
     "gate": Key(
-        Quantity("", low=0.1, high=1e6),
+        NumberWithUnit("", low=0.1, high=1e6),
         "innovations of more standard deviations are rejected",
         "5.0",
     ),
-    "cohesion_bounds": Key(Interval(Quantity("Pa", low=0)), "c stays inside", "[0 kPa, 50 kPa]"),
-    "tan_phi_bounds": Key(Interval(Quantity("", above=0)), "tan φ stays inside", "[0.05, 1.5]"),
+    "cohesion_bounds": Key(
+        Interval(NumberWithUnit("Pa", low=0)), "c stays inside", "[0 kPa, 50 kPa]"
+    ),
+    "tan_phi_bounds": Key(
+        Interval(NumberWithUnit("", above=0)), "tan φ stays inside", "[0.05, 1.5]"
+    ),
     "shear_modulus_bounds": Key(
-        Interval(Quantity("m", above=0)), "k stays inside", "[1 mm, 200 mm]"
+        Interval(NumberWithUnit("m", above=0)), "k stays inside", "[1 mm, 200 mm]"
     ),
     "estimate_k": Key(
         Choice(("auto", "always", "never")),
@@ -195,7 +199,7 @@ FILTER = {
         "auto",
     ),
     "model_sigma": Key(
-        Quantity("", low=0, high=1),
+        NumberWithUnit("", low=0, high=1),
         "relative error of the closed forms not modelled elsewhere",
         "0.0",
     ),
@@ -204,15 +208,19 @@ FILTER = {
 LOGGING = {
     "directory": Key(NAME, "folder of the recordings", "runs"),
     "flush_interval": Key(
-        Quantity("s", above=0, high=60), "every chunk is closed and synced this often", "200 ms"
+        NumberWithUnit("s", above=0, high=60),
+        "every chunk is closed and synced this often",
+        "200 ms",
     ),
     "compression": Key(Choice(("zstd", "lz4", "none")), "compression of a chunk", "zstd"),
     "part_size": Key(
-        Quantity("B", low=100e3, unlimited=True), "beyond it a new recording part begins", "256 MB"
+        NumberWithUnit("B", low=100e3, unlimited=True),
+        "beyond it a new recording part begins",
+        "256 MB",
     ),
-    "part_time": Key(Quantity("s", low=1, unlimited=True), "and after this time", "1 h"),
+    "part_time": Key(NumberWithUnit("s", low=1, unlimited=True), "and after this time", "1 h"),
     "disk_cap": Key(
-        Quantity("B", low=1e6, unlimited=True),
+        NumberWithUnit("B", low=1e6, unlimited=True),
         "all recordings in the folder together; beyond it the oldest closed ones are deleted",
         UNLIMITED,
     ),
@@ -222,10 +230,10 @@ LOGGING = {
 }
 
 REPEATABILITY = {
-    "cohesion": Key(Quantity("Pa", low=0), "of c", "0 Pa"),
-    "tan_phi": Key(Quantity("", low=0), "of tan φ", "0.0"),
-    "shear_modulus": Key(Quantity("", low=0, high=1), "of k, relative", "0 %"),
-    "surface": Key(Quantity("m", low=0, high=0.1), "of its height along the bed", "0 mm"),
+    "cohesion": Key(NumberWithUnit("Pa", low=0), "of c", "0 Pa"),
+    "tan_phi": Key(NumberWithUnit("", low=0), "of tan φ", "0.0"),
+    "shear_modulus": Key(NumberWithUnit("", low=0, high=1), "of k, relative", "0 %"),
+    "surface": Key(NumberWithUnit("m", low=0, high=0.1), "of its height along the bed", "0 mm"),
 }
 
 BED = {
@@ -238,7 +246,7 @@ BED = {
         "{}",
     ),
     "stale_after": Key(
-        Quantity("s", above=0, unlimited=True),
+        NumberWithUnit("s", above=0, unlimited=True),
         "without a run for so long the next begins with `soil`",
         "168 h",
     ),
@@ -246,9 +254,9 @@ BED = {
 
 RUN = {
     "name": Key(Text(EXPECTED, PATTERN), "name of the run and its files", "''"),
-    "load": Key(Quantity("N", above=0), "nominal load of the run", ABSENT),
+    "load": Key(NumberWithUnit("N", above=0), "nominal load of the run", ABSENT),
     "pass": Key(Integer(1, 1000), "how often the wheel goes over this track, from 1", "1"),
-    "start": Key(Quantity("m"), "starting position of the wheel on the bed", "0 m"),
+    "start": Key(NumberWithUnit("m"), "starting position of the wheel on the bed", "0 m"),
     "operator": Key(Text(), "who runs it, for the lab book", "''"),
     "notes": Key(Text(), "anything worth keeping, one line", "''"),
 }
@@ -284,7 +292,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "testbed": Key(NAME, "name of the testbed"),
         "wheel": Key(Section(WHEEL, _wheel), "the rigid wheel"),
         "pulley_radius": Key(
-            Quantity("m", above=0, high=5), "radius of the carriage encoder's pulley"
+            NumberWithUnit("m", above=0, high=5), "radius of the carriage encoder's pulley"
         ),
         "soil": Key(Section(SOIL, _soil), "what is known of the soil before the run"),
         "drive": Key(Section(DRIVE, Drive), "motor and gear, seen from the wheel axle"),

@@ -37,7 +37,7 @@ class ConfigError(Exception):
 
 
 @dataclass(frozen=True)
-class Place:
+class FilePosition:
     """Where in which file: enough to begin an error line."""
 
     file: str
@@ -50,32 +50,32 @@ class Place:
             f" expected {expected}"
         )
 
-    def key(self, name: str, line: int | None = None) -> Place:
+    def key(self, name: str, line: int | None = None) -> FilePosition:
         """The place of a key inside this one."""
         path = f"{self.path}.{name}" if self.path else name
-        return Place(self.file, self.line if line is None else line, path)
+        return FilePosition(self.file, self.line if line is None else line, path)
 
 
 @dataclass(frozen=True)
 class Scalar:
-    place: Place
+    place: FilePosition
     text: str
     tag: str  # str, int, float, bool, null, timestamp: what YAML reads it as
 
 
 @dataclass(frozen=True)
-class Sequence:
-    place: Place
+class YamlSequence:
+    place: FilePosition
     items: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Mapping:
-    place: Place
+    place: FilePosition
     items: dict[str, Node] = field(default_factory=dict)
 
 
-Node = Scalar | Sequence | Mapping
+Node = Scalar | YamlSequence | Mapping
 
 
 def shown(text: str) -> str:
@@ -86,7 +86,7 @@ def shown(text: str) -> str:
 
 def describe(node: Node) -> str:
     """What was found, in words."""
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return f"a list of {len(node.items)}"
     if isinstance(node, Mapping):
         return "a mapping" if node.items else "an empty mapping"
@@ -139,7 +139,7 @@ def read_text(path: Path, expected: str = "a configuration file") -> str:
 
 def compose(text: str, file: str) -> Node:
     """The tree of a YAML document. Raises ConfigError."""
-    top = Place(file, 1, "")
+    top = FilePosition(file, 1, "")
     if len(text.encode("utf-8", "replace")) > MAX_BYTES:
         raise top.error(f"more than {MAX_BYTES // 1024} KiB", "a configuration file")
     return _Composer(text, top).document()
@@ -169,7 +169,7 @@ def _marked(event: yaml.Event) -> bool:
 def _yaml(node: Node) -> yaml.Node:
     if isinstance(node, Scalar):
         return yaml.ScalarNode(f"tag:yaml.org,2002:{node.tag}", node.text)
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return yaml.SequenceNode(
             "tag:yaml.org,2002:seq", [_yaml(item) for item in node.items], flow_style=True
         )
@@ -184,7 +184,7 @@ def _yaml(node: Node) -> yaml.Node:
 class _Composer:
     """Events to nodes, with the limits."""
 
-    def __init__(self, text: str, top: Place) -> None:
+    def __init__(self, text: str, top: FilePosition) -> None:
         self._top = top
         self._place = top  # of the node under way: where a syntax error is reported
         self._count = 0
@@ -213,36 +213,36 @@ class _Composer:
             raise self._blamed(error).error(problem, "valid YAML") from None
         except (yaml.YAMLError, UnicodeError):
             line = _unprintable_line(text)
-            raise Place(self._top.file, line, "").error(
+            raise FilePosition(self._top.file, line, "").error(
                 "a character YAML forbids", "printable UTF-8 text"
             ) from None
 
-    def _blamed(self, error: yaml.MarkedYAMLError) -> Place:
+    def _blamed(self, error: yaml.MarkedYAMLError) -> FilePosition:
         """The line of a syntax error; that of the beginning where the end is what is missing."""
         unended = "end of stream" in (error.problem or "") and error.context_mark
         mark = error.context_mark if unended else error.problem_mark
-        return Place(
+        return FilePosition(
             self._place.file, mark.line + 1 if mark else self._place.line, self._place.path
         )
 
     def _next(self) -> yaml.Event:
         return next(self._events)
 
-    def _at(self, event: yaml.Event, place: Place) -> Place:
+    def _at(self, event: yaml.Event, place: FilePosition) -> FilePosition:
         """The place, on the event's own line."""
         mark = event.start_mark
-        return Place(place.file, mark.line + 1 if mark else place.line, place.path)
+        return FilePosition(place.file, mark.line + 1 if mark else place.line, place.path)
 
-    def _node(self, event: yaml.Event, place: Place, depth: int) -> Node:
+    def _node(self, event: yaml.Event, place: FilePosition, depth: int) -> Node:
         self._place = place
         self._check(event, place, depth)
         if isinstance(event, yaml.ScalarEvent):
             return Scalar(place, event.value, _tag(event))
         if isinstance(event, yaml.SequenceStartEvent):
-            return Sequence(place, tuple(self._sequence(place, depth)))
+            return YamlSequence(place, tuple(self._sequence(place, depth)))
         return self._mapping(place, depth)
 
-    def _check(self, event: yaml.Event, place: Place, depth: int) -> None:
+    def _check(self, event: yaml.Event, place: FilePosition, depth: int) -> None:
         self._count += 1
         here = self._at(event, place)
         if self._count > MAX_NODES:
@@ -259,13 +259,13 @@ class _Composer:
         if tag is not None:
             raise here.error(f"the tag {shown(tag)}", "a value without a tag")
 
-    def _sequence(self, place: Place, depth: int) -> Iterator[Node]:
+    def _sequence(self, place: FilePosition, depth: int) -> Iterator[Node]:
         index = 0
         while not isinstance(event := self._next(), yaml.SequenceEndEvent):
             yield self._node(event, self._at(event, place).key(str(index)), depth + 1)
             index += 1
 
-    def _mapping(self, place: Place, depth: int) -> Mapping:
+    def _mapping(self, place: FilePosition, depth: int) -> Mapping:
         items: dict[str, Node] = {}
         while not isinstance(event := self._next(), yaml.MappingEndEvent):
             name = self._key(event, place)
@@ -279,7 +279,7 @@ class _Composer:
 
         return Mapping(place, items)
 
-    def _key(self, event: yaml.Event, place: Place) -> str:
+    def _key(self, event: yaml.Event, place: FilePosition) -> str:
         self._check(event, place, 0)
         if not isinstance(event, yaml.ScalarEvent):
             raise self._at(event, place).error("a list or mapping as a key", "a name")

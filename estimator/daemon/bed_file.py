@@ -27,7 +27,7 @@ from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.filter.tuning import FORM, TRUST
 from gritd.estimator.online.bed import (
     Known,
-    Start,
+    RunStart,
     after_run,
     before_run,
     fingerprint,
@@ -200,7 +200,7 @@ def _credible(known: Estimate, prior: Estimate, preparation: Array) -> bool:
     return bool(np.all(variance[:STATES] <= widest) and np.all(near[STATES:]))
 
 
-def start_of(bed: Bed, settings: Settings, now: float) -> Start | None:
+def start_of(bed: Bed, settings: Settings, now: float) -> RunStart | None:
     """What a run begins with; None for the stated prior."""
     if bed.known is None or useless(bed, settings, now):
         return None

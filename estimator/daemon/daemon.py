@@ -21,11 +21,11 @@ from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.daemon.disagreement import Watch
 from gritd.estimator.daemon.feed import Feed
 from gritd.estimator.daemon.log_sink import LogSink
-from gritd.estimator.daemon.loop import Change, Loop, Source
+from gritd.estimator.daemon.loop import Change, Loop, ReadingSource
 from gritd.estimator.daemon.rotation import Rotation
 from gritd.estimator.daemon.scheduling import first, on_one_core, undisturbed
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.online.bed import Start
+from gritd.estimator.online.bed import RunStart
 from gritd.estimator.online.carry import needs_restart
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.topics import LOG_TOPIC, TOPICS
@@ -83,9 +83,9 @@ class Daemon:
         path: Path,
         run: RunInfo,
         readers: Sequence[ReaderThread],
-        source: Source,
+        source: ReadingSource,
         clock: Clock,
-        start: Start | None = None,
+        start: RunStart | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self.configuration = configuration

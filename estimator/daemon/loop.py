@@ -14,7 +14,7 @@ from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
 from gritd.estimator.messages.update import update_of
-from gritd.estimator.online.bed import Start, begun
+from gritd.estimator.online.bed import RunStart, begun
 from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import encode
 from gritd.estimator.online.pipeline import Pipeline, State
@@ -46,7 +46,7 @@ class Sink(Protocol):
         """The configuration and the state that the next tick begins with. Must not block."""
 
 
-class Source(Protocol):
+class ReadingSource(Protocol):
     """Where readings come from: the queue behind the readers."""
 
     def drain(self) -> list[Reading]: ...
@@ -62,11 +62,11 @@ class Loop:
     def __init__(
         self,
         pipeline: Pipeline,
-        source: Source,
+        source: ReadingSource,
         sink: Sink,
         clock: Clock,
         configuration: str = "",
-        start: Start | None = None,
+        start: RunStart | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock

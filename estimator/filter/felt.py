@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gritd.estimator.filter.estimate import Estimate, Vector, dot, soil
-from gritd.estimator.filter.model import Prediction, Quantity
+from gritd.estimator.filter.model import ForcePrediction, PredictedQuantity
 from gritd.estimator.wheel.chain import Added, Chain, Here
 from gritd.estimator.wheel.wheel_state import WheelState
 
@@ -21,7 +21,7 @@ def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
 
 
 def effects_added(
-    chain: Chain, now: WheelState, rim: Prediction, x: tuple[float, float, float]
+    chain: Chain, now: WheelState, rim: ForcePrediction, x: tuple[float, float, float]
 ) -> Added:
     """What the effects add to the rim's torque and pull, with its slope along x = (c, tan φ, k)."""
 
@@ -49,7 +49,7 @@ def effects_added(
     )
 
 
-def with_added(prediction: Prediction, added: Added, estimate: Estimate) -> Prediction:
+def with_added(prediction: ForcePrediction, added: Added, estimate: Estimate) -> ForcePrediction:
     x = soil(estimate)
     return prediction._replace(
         torque=_plus(prediction.torque, added[:4], x),
@@ -57,7 +57,7 @@ def with_added(prediction: Prediction, added: Added, estimate: Estimate) -> Pred
     )
 
 
-def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
+def _plus(quantity: PredictedQuantity, added: Vector, x: Vector) -> PredictedQuantity:
     """A quantity of the rim with what effects add, linear in x = (c, tan φ, k)."""
     offset, *slopes = added
     return quantity._replace(
@@ -68,11 +68,11 @@ def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
     )
 
 
-def raised(quantity: Quantity, value: float) -> Quantity:
+def raised(quantity: PredictedQuantity, value: float) -> PredictedQuantity:
     return quantity._replace(value=quantity.value + value)
 
 
-def by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity:
+def by_estimate(quantity: PredictedQuantity, estimate: Estimate, here: Here) -> PredictedQuantity:
     """Gradient with respect to the estimated soil, from that with respect to the soil under this
     window.
     """

@@ -26,7 +26,7 @@ from gritd.estimator.filter.estimate import (
     variance,
 )
 from gritd.estimator.filter.felt import by_estimate, effects_added, raised, soil_here, with_added
-from gritd.estimator.filter.model import FormError, Prediction, Quantity, WheelModel
+from gritd.estimator.filter.model import ForcePrediction, FormError, PredictedQuantity, WheelModel
 from gritd.estimator.filter.nuisance import (
     EXPONENT,
     PEAK,
@@ -140,17 +140,17 @@ class Measurement:
 
         return now._replace(columns=tuple(columns))
 
-    def predict(self, estimate: Estimate, now: WheelState) -> Prediction:
+    def predict(self, estimate: Estimate, now: WheelState) -> ForcePrediction:
         """T, DP and resistance of the equations at the estimate, in this window's geometry."""
         return self._predicted(self.model, estimate, now)
 
-    def shared(self, now: WheelState, prediction: Prediction) -> Shared:
+    def shared(self, now: WheelState, prediction: ForcePrediction) -> Shared:
         """How a prediction follows the errors that all windows share."""
         sensitivity = _sensitivity(now, prediction)
         return Shared(sensitivity, *self._shared_gradients(sensitivity, now))
 
     def expected(
-        self, estimate: Estimate, prediction: Prediction, shared: Shared
+        self, estimate: Estimate, prediction: ForcePrediction, shared: Shared
     ) -> tuple[float, float]:
         """T [N·m] and DP [N] as the sensors should read them: the prediction, and the errors that
         all windows share.
@@ -187,7 +187,7 @@ class Measurement:
         lagging = form.remember(wheeling(now, snapshot.wheel_angle), recall.get(NAME, ()))
         return {**after, NAME: lagging}
 
-    def linearise(self, now: WheelState, prediction: Prediction, estimate: Estimate) -> Update:
+    def linearise(self, now: WheelState, prediction: ForcePrediction, estimate: Estimate) -> Update:
         """Innovation, H and R of the components that are measured."""
         torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity, by_torque, by_pull = self.shared(now, prediction)
@@ -255,7 +255,7 @@ class Measurement:
         return noise if now.form is None else _plus_rest(noise, _rest(now.form, s), self._lasting)
 
     def sigmas(
-        self, estimate: Estimate, now: WheelState, prediction: Prediction, shared: Shared
+        self, estimate: Estimate, now: WheelState, prediction: ForcePrediction, shared: Shared
     ) -> tuple[float, float, float]:
         """σ of T, DP and resistance predicted: of the estimate, and of this window's z, i and W."""
         sensitivity, torque, pull = shared
@@ -272,7 +272,7 @@ class Measurement:
         self,
         estimate: Estimate,
         now: WheelState,
-        quantity: Quantity,
+        quantity: PredictedQuantity,
         shared: Vector,
         rest: Vector = (),
     ) -> float:
@@ -303,7 +303,7 @@ class Measurement:
         rim = self._predicted(model, estimate, now)
         return now._replace(added=effects_added(chain, now, rim, soil(estimate)))
 
-    def _predicted(self, model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
+    def _predicted(self, model: WheelModel, estimate: Estimate, now: WheelState) -> ForcePrediction:
         """T, DP and resistance of the rim in the soil under this window, and what effects add,
         along the estimate.
         """
@@ -314,7 +314,7 @@ class Measurement:
         )
         if now.here is not None:
             here = now.here
-            prediction = Prediction(
+            prediction = ForcePrediction(
                 *(by_estimate(quantity, estimate, here) for quantity in prediction)
             )
 
@@ -359,7 +359,7 @@ def _plus_rest(noise: Matrix, rest: tuple[Vector, Vector], lasting: float) -> Ma
     return (a + lasting * dot(torque, torque), b), (b, d + lasting * dot(pull, pull))
 
 
-def _innovation(now: WheelState, prediction: Prediction) -> tuple[float, float]:
+def _innovation(now: WheelState, prediction: ForcePrediction) -> tuple[float, float]:
     """Measured minus predicted T and DP; 0 where one is not measured."""
     torque = now.torque.value - prediction.torque.value
     pull = now.drawbar_pull.value - prediction.drawbar_pull.value
@@ -372,7 +372,7 @@ def _variants(settings: Settings) -> list[tuple[WheelModel, Chain]]:
     return [(WheelModel(settings, chain), chain) for chain in moved]
 
 
-def _sensitivity(now: WheelState, prediction: Prediction) -> Sensitivity:
+def _sensitivity(now: WheelState, prediction: ForcePrediction) -> Sensitivity:
     torque, pull = prediction.torque, prediction.drawbar_pull
     by_z = now.theta_1.d_sinkage
 
@@ -390,6 +390,6 @@ def _sensitivity(now: WheelState, prediction: Prediction) -> Sensitivity:
     )
 
 
-def _state_gradient(quantity: Quantity) -> Vector:
+def _state_gradient(quantity: PredictedQuantity) -> Vector:
     """Gradient with respect to the scaled state [c/kPa, tan φ, ln k]."""
     return quantity.by_c * KPA, quantity.by_tan_phi, quantity.by_ln_k

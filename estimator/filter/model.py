@@ -19,7 +19,7 @@ from gritd.estimator.wheel.chain import Chain
 from gritd.estimator.wheel.sync import Measured
 
 
-class Quantity(NamedTuple):
+class PredictedQuantity(NamedTuple):
     """A predicted force or torque and its gradient, SI."""
 
     value: float
@@ -44,10 +44,10 @@ class FormError(NamedTuple):
 AS_CONFIGURED = FormError()
 
 
-class Prediction(NamedTuple):
-    torque: Quantity  # T [N·m]
-    drawbar_pull: Quantity  # DP [N]
-    resistance: Quantity  # [N]
+class ForcePrediction(NamedTuple):
+    torque: PredictedQuantity  # T [N·m]
+    drawbar_pull: PredictedQuantity  # DP [N]
+    resistance: PredictedQuantity  # [N]
 
 
 class WheelModel:
@@ -69,19 +69,19 @@ class WheelModel:
         slip: float,
         load: float,
         form: FormError = AS_CONFIGURED,
-    ) -> Prediction:
+    ) -> ForcePrediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
         if self._closed is not None:
             known = self._closed.predict(c, tan_phi, k, theta_1, slip, load, *form)
             if known is not None:
-                return Prediction(*known)
+                return ForcePrediction(*known)
 
         shift = self._at(k, theta_1, slip, form)
         p = scalar.predict(self._moved(form), c, tan_phi, k, theta_1, slip, load, shift)
-        return Prediction(
-            Quantity(p.torque, *p.torque_gradient),
-            Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),
-            Quantity(p.resistance, *p.resistance_gradient),
+        return ForcePrediction(
+            PredictedQuantity(p.torque, *p.torque_gradient),
+            PredictedQuantity(p.drawbar_pull, *p.drawbar_pull_gradient),
+            PredictedQuantity(p.resistance, *p.resistance_gradient),
         )
 
     def _at(self, k: float, theta_1: float, slip: float, form: FormError) -> linear.Shift | None:
@@ -143,8 +143,10 @@ def _compiled(wheel: Wheel, shift: IntegralShift | None) -> arithmetic.Closed | 
         return None
     numbers = (float(wheel.radius), float(wheel.width), float(wheel.c1), float(wheel.c2))
     if shift is None:
-        return arithmetic.Closed(Quantity, numbers, 0.0, THETA_1, SLIP, None)
-    return arithmetic.Closed(Quantity, numbers, shift.ln_k, THETA_1, SLIP, shift.coefficients)
+        return arithmetic.Closed(PredictedQuantity, numbers, 0.0, THETA_1, SLIP, None)
+    return arithmetic.Closed(
+        PredictedQuantity, numbers, shift.ln_k, THETA_1, SLIP, shift.coefficients
+    )
 
 
 def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:

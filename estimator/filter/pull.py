@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.measurement import Measurement
-from gritd.estimator.filter.model import Prediction
+from gritd.estimator.filter.model import ForcePrediction
 from gritd.estimator.wheel.wheel_state import WheelState
 
 SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -51,7 +51,9 @@ def search_on(measurement: Measurement, search: Search, known: Pull) -> tuple[Se
     return None, Pull(prediction.drawbar_pull.value, sigma, best)
 
 
-def _at(measurement: Measurement, search: Search, slip: float) -> tuple[WheelState, Prediction]:
+def _at(
+    measurement: Measurement, search: Search, slip: float
+) -> tuple[WheelState, ForcePrediction]:
     """The window at another slip, and what is predicted there."""
     there = measurement.at_slip(search.now, slip)
     return there, measurement.predict(search.estimate, there)

@@ -208,7 +208,7 @@ def true_integrals(
     theta_m = np.clip(law.theta_m_ratio, 0.0, PEAK) * theta_1
     depth = (wheel.radius * (np.cos(theta_m) - np.cos(theta_1))) ** soil.exponent
 
-    def forces(c: float, sigma_m: float, tan_phi: float) -> original.Forces:
+    def forces(c: float, sigma_m: float, tan_phi: float) -> original.OriginalForces:
         return original.forces(
             wheel,
             Soil(c, tan_phi, soil.shear_modulus, soil.exponent, sigma_m / depth),

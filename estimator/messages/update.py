@@ -49,7 +49,7 @@ class Normalised(NamedTuple):
     drawbar_pull_sigmas: Annotated[Real, "of the drawbar pull, NaN where it is not measured [-]"]
 
 
-class Update(NamedTuple):
+class UpdateMessage(NamedTuple):
     """One update: its blocks in the order of the recording."""
 
     head: UpdateHead
@@ -59,8 +59,8 @@ class Update(NamedTuple):
     soil: SoilEstimate
 
 
-UPDATE_NAMES = names_of(Update)
-UPDATE_FIELDS = fields_of(Update)
+UPDATE_NAMES = names_of(UpdateMessage)
+UPDATE_FIELDS = fields_of(UpdateMessage)
 
 _PLACE = {name: place for place, name in enumerate(TICK_NAMES)}
 _COPIED = [_PLACE[name] for name in UPDATE_NAMES if name not in Normalised._fields]

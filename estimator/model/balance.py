@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.stages.situation import ContactLaw
-from gritd.estimator.terramechanics.original import Forces, forces
+from gritd.estimator.terramechanics.original import OriginalForces, forces
 from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
 # nodes a zone: W, DP and T/r within 3e-7 of W when driving, 2e-5 down to 10 % braking
@@ -39,12 +39,14 @@ class Contact(NamedTuple):
 
 class Balance(NamedTuple):
     theta_1: Array  # [rad]
-    forces: Forces  # at θ₁, each (n,)
+    forces: OriginalForces  # at θ₁, each (n,)
     overloaded: Array  # bool: the load exceeds what the soil carries; forces are those at DEEPEST
     slope: Array  # d ln W / d ln θ₁ as the steps to θ₁ saw it
 
 
-def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER) -> Forces:
+def rim_forces(
+    wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER
+) -> OriginalForces:
     """Forces of Eqs. (8)-(10) under the contact law at θ₁ (n,) [rad]; θₘ and θ₂ keep their ratio
     to θ₁.
     """
@@ -81,7 +83,7 @@ def solve(
 
     return Balance(
         np.concatenate([part.theta_1 for part in solved]),
-        Forces(*map(np.concatenate, zip(*(part.forces for part in solved), strict=True))),
+        OriginalForces(*map(np.concatenate, zip(*(part.forces for part in solved), strict=True))),
         np.concatenate([part.overloaded for part in solved]),
         np.concatenate([part.slope for part in solved]),
     )
@@ -89,7 +91,7 @@ def solve(
 
 def part_of(near: Balance, at: slice) -> Balance:
     """Some of the samples of a solution."""
-    forces = Forces(*(force[at] for force in near.forces))
+    forces = OriginalForces(*(force[at] for force in near.forces))
     return Balance(near.theta_1[at], forces, near.overloaded[at], near.slope[at])
 
 
@@ -101,7 +103,7 @@ def _solve_chunk(wheel: Wheel, contact: Contact, near: Balance | None, order: in
     else:
         theta_1, slope = near.theta_1, near.slope
 
-    out = np.zeros((3 + len(Forces._fields), load.size))
+    out = np.zeros((3 + len(OriginalForces._fields), load.size))
     out[-1] = 1.0
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
@@ -110,7 +112,7 @@ def _solve_chunk(wheel: Wheel, contact: Contact, near: Balance | None, order: in
         out[:, touching] = np.vstack(
             (solved.theta_1, *solved.forces, solved.overloaded, solved.slope)
         )
-    return Balance(out[0], Forces(*out[1:-2]), out[-2] > 0.0, out[-1])
+    return Balance(out[0], OriginalForces(*out[1:-2]), out[-2] > 0.0, out[-1])
 
 
 def _iterate(
@@ -122,7 +124,10 @@ def _iterate(
     near: the last step may be taken without integrating again.
     """
     solution, steepness = np.empty(guess.size), np.empty(guess.size)
-    kept, overloaded = np.empty((len(Forces._fields), guess.size)), np.zeros(guess.size, dtype=bool)
+    kept, overloaded = (
+        np.empty((len(OriginalForces._fields), guess.size)),
+        np.zeros(guess.size, dtype=bool),
+    )
     left = np.arange(guess.size)  # samples not yet solved
     x = np.log(np.clip(guess, 10.0 * SHALLOWEST, DEEPEST))
 
@@ -156,7 +161,7 @@ def _iterate(
             high[rest],
         )
 
-    return Balance(np.exp(solution), Forces(*kept), overloaded, steepness)
+    return Balance(np.exp(solution), OriginalForces(*kept), overloaded, steepness)
 
 
 def _extrapolated(here: Array, before: Array, slope: Array) -> tuple[Array, Bools]:
@@ -178,7 +183,7 @@ def _ahead(step: Array, low: Array, high: Array) -> Array:
     return np.where((step > low) & (step < high), step, 0.5 * (low + np.minimum(high, TOP)))
 
 
-def _miss(forces: Forces, contact: Contact) -> Array:
+def _miss(forces: OriginalForces, contact: Contact) -> Array:
     """ln(W/load); where the soil would pull the wheel down, a large negative number."""
     miss: Array = np.log(np.maximum(forces.load / contact.load, 1e-30))
     return miss

@@ -28,7 +28,7 @@ from gritd.estimator.stages.situation import (
     Situation,
     situation_of,
 )
-from gritd.estimator.terramechanics.original import Forces
+from gritd.estimator.terramechanics.original import OriginalForces
 from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
 # at most; current and torque factor depend on each other and settle in a few rounds
@@ -122,7 +122,9 @@ def carried_at(
     )
 
     share = (situation.load - bare.load) / (stated.load - bare.load)  # forces are linear in it
-    forces = Forces(*(low + share * (high - low) for low, high in zip(bare, stated, strict=True)))
+    forces = OriginalForces(
+        *(low + share * (high - low) for low, high in zip(bare, stated, strict=True))
+    )
     none = np.zeros(theta_1.shape)
     return Carried(wheel, situation, balance.Balance(theta_1, forces, none, none))
 
@@ -208,7 +210,9 @@ def paper_contact(wheel: Wheel, situation: Situation) -> ContactLaw:
     return ContactLaw(theta_m_ratio=np.clip(wheel.c1 + wheel.c2 * situation.slip, 0.0, 1.0))
 
 
-def loaded(situation: Situation, wheel: Wheel, theta_1: Scalar, forces: Forces) -> Situation:
+def loaded(
+    situation: Situation, wheel: Wheel, theta_1: Scalar, forces: OriginalForces
+) -> Situation:
     """The situation once the rim stresses are known, θ₁ (n,) [rad]; in reverse drawbar pull and
     torque change sign.
     """

@@ -36,7 +36,7 @@ from gritd.estimator.messages.tick import (
 from gritd.estimator.offline.run_window import Windows, windows
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.offline.streams import RecordedStreams, recorded_streams
-from gritd.estimator.online.bed import Start, begun
+from gritd.estimator.online.bed import RunStart, begun
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.wheel.sync import Snapshot
@@ -68,7 +68,7 @@ class PointPredictions(NamedTuple):
     rolling_resistance: float = nan
 
 
-class Window(NamedTuple):
+class BatchWindow(NamedTuple):
     """What is kept of one window: blocks and names of `Tick`."""
 
     head: WindowHead
@@ -80,7 +80,7 @@ class Window(NamedTuple):
     drawbar_pull: Annotated[Aid, "N"]
 
 
-ESTIMATES = names_of(Window)
+ESTIMATES = names_of(BatchWindow)
 _WINDOW_DTYPE = np.dtype([(name, _DTYPES[name]) for name in ESTIMATES])
 # a row as bytes of the table: numpy takes four times as long for a tuple
 _PACK = Struct("<" + "".join(_CODES[_DTYPES[name]] for name in ESTIMATES)).pack
@@ -116,7 +116,7 @@ def replayed(
     settings: Settings,
     recording: Recording,
     engine: str = "plain",
-    start: Start | None = None,
+    start: RunStart | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of a recording, begun with the stated prior or with `start`. See
@@ -131,7 +131,7 @@ def followed(
     settings: Settings,
     streams: RecordedStreams,
     engine: str = "plain",
-    start: Start | None = None,
+    start: RunStart | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of readings, window by window.
@@ -177,12 +177,12 @@ def _snapshots(settings: Settings, streams: RecordedStreams, part: Windows) -> I
         yield from snapshots(settings, streams, ends, part.length)
 
 
-def _window(tracker: Tracker, state: TrackState, account: Account) -> Window:
+def _window(tracker: Tracker, state: TrackState, account: Account) -> BatchWindow:
     """One window, after its update."""
     snapshot = account.snapshot
     torque, drawbar_pull = aids(account)
 
-    return Window(
+    return BatchWindow(
         head=WindowHead(
             evaluated=snapshot.evaluated,
             status=account.status,

@@ -20,7 +20,7 @@ from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.readings import ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.offline.streams import RecordedStreams, Stream
-from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
+from gritd.estimator.offline.windows import Bools, Ints, Members, WindowLines, lines, members
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot, window_at_first
 from gritd.estimator.wheel.windows import DITHER, ENOUGH, Sample
@@ -89,7 +89,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Motion(Series):
+class EncoderSeries(Series):
     """The speed of an encoder, and its position."""
 
     position: Array  # (m,)
@@ -108,7 +108,7 @@ def _listed(column: NDArray[Any] | Series, part: slice) -> Iterable[Any]:
     return listed
 
 
-class Accepted(NamedTuple):
+class AcceptedReadings(NamedTuple):
     """The readings of a channel that came in time, each stamp once, and the windows they lie in."""
 
     stamp: Ints  # (n,) [ns], ascending
@@ -168,7 +168,7 @@ class View:
         self.length = length
         self.ends = self._closed[chosen]
         nan, zero = np.full(len(chosen), np.nan), np.zeros(len(chosen))
-        self.nothing = Motion(nan, zero, zero > 0, np.zeros(len(chosen), np.int64), nan)
+        self.nothing = EncoderSeries(nan, zero, zero > 0, np.zeros(len(chosen), np.int64), nan)
 
     def mean(self, name: str) -> Series:
         """An analogue channel."""
@@ -239,7 +239,7 @@ class View:
         """The beginning of the window (n,) into which each reading comes [ns]."""
         return np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp)]
 
-    def slope(self, name: str, arm: float) -> Motion:
+    def slope(self, name: str, arm: float) -> EncoderSeries:
         """Position and speed of an encoder; arm is the pulley radius, or 1 for an angle."""
         channel, stream = self._settings.channels[name], self._streams.get(name)
         if stream is None:
@@ -258,7 +258,7 @@ class View:
         scale = channel.calibration.scale.value * arm
         position = line.mean * scale + channel.calibration.offset.value * arm
         sigma = _slope_sigma(channel.noise, members.size, line)
-        return Motion(
+        return EncoderSeries(
             np.where(known, line.rate * scale, np.nan),
             np.where(known, sigma * abs(scale), 0.0),
             known,
@@ -280,7 +280,7 @@ class View:
 
     def _accepted(
         self, stream: Stream, values: NDArray[Any], valid: Bools, latency: float
-    ) -> Accepted | None:
+    ) -> AcceptedReadings | None:
         """The readings in time, sorted, each stamp once; None without any."""
         stamp = stream.stamp - round(latency * NS)
         taken = np.flatnonzero(valid & (stamp > np.append(-1, self._closed)[stream.tick]))
@@ -293,9 +293,9 @@ class View:
         stamp, values = stamp[fresh], values[taken[fresh]]
         if not stamp.size:
             return None
-        return Accepted(stamp, values, members(stamp, self.ends - self.length, self.ends))
+        return AcceptedReadings(stamp, values, members(stamp, self.ends - self.length, self.ends))
 
-    def _rebaselined(self, accepted: Accepted, max_rate: float) -> Accepted:
+    def _rebaselined(self, accepted: AcceptedReadings, max_rate: float) -> AcceptedReadings:
         """With every jump taken out, and windows cut at a second one; see
         wheel.windows.SlopeWindow.
         """
@@ -324,7 +324,7 @@ class View:
 
         after = np.append(-1, stamp)[np.maximum.accumulate(cuts)][accepted.members.last]
         windows = members(stamp, np.maximum(self.ends - self.length, after), self.ends)
-        return Accepted(stamp, shifted, windows)
+        return AcceptedReadings(stamp, shifted, windows)
 
     def stale(self) -> Ints:
         """CHANNEL_BITS (m,) of channels last heard of longer ago than they may be, or never."""
@@ -345,7 +345,11 @@ class View:
         return latest[np.searchsorted(stream.tick, self._chosen, "right")]
 
     def stuck(
-        self, wheel: Motion, carriage: Motion, means: Mapping[str, Series], axes: Sequence[Series]
+        self,
+        wheel: EncoderSeries,
+        carriage: EncoderSeries,
+        means: Mapping[str, Series],
+        axes: Sequence[Series],
     ) -> Ints:
         """CHANNEL_BITS (m,) of channels that stand still while others move; see sync.Sync."""
         bits = CHANNEL_BITS["wheel_encoder"] * (carriage.moves & (wheel.still >= STUCK_AFTER))
@@ -368,7 +372,7 @@ class View:
         return np.asarray(np.any([axis.known for axis in axes], axis=0) & ~np.any(live, axis=0))
 
 
-def _slope_sigma(noise: float, size: Ints, line: Lines) -> Array:
+def _slope_sigma(noise: float, size: Ints, line: WindowLines) -> Array:
     """Standard deviation of each window's rate (m,) [raw/s]; see geometry.slope_sigma."""
     count = np.maximum(size, 1)
     independent = np.minimum(count, (line.moved + 1.0) ** 2)

@@ -73,7 +73,7 @@ def members(stamp: Ints, after: Ints, until: Ints) -> Members:
     return Members(reading, window, size, np.minimum(low, len(stamp) - 1), np.maximum(high - 1, 0))
 
 
-class Lines(NamedTuple):
+class WindowLines(NamedTuple):
     """A least-squares line through the counts of each window; without meaning below two
     readings.
     """
@@ -84,7 +84,7 @@ class Lines(NamedTuple):
     moved: Array  # (m,) counts from the first reading to the last [raw]
 
 
-def lines(members: Members, stamp: Ints, counts: Ints) -> Lines:
+def lines(members: Members, stamp: Ints, counts: Ints) -> WindowLines:
     """Lines through the counts (n,) at the stamps (n,) [ns]; see wheel.windows.SlopeWindow."""
     reading, window = members.reading, members.window
     origin = counts[members.first]
@@ -99,7 +99,7 @@ def lines(members: Members, stamp: Ints, counts: Ints) -> Lines:
         rate = members.sum(t * (x - mean[window])) / spread * NS
 
     moved = np.abs(counts[members.last] - origin).astype(float)
-    return Lines(origin + mean, rate, np.sqrt(spread) / NS, moved)
+    return WindowLines(origin + mean, rate, np.sqrt(spread) / NS, moved)
 
 
 # ---- blocks side by side -------------------------------------------------------------------------

@@ -48,7 +48,7 @@ class Known(NamedTuple):
         return told(self.bank)
 
 
-class Start(NamedTuple):
+class RunStart(NamedTuple):
     """What a run begins with in the place of the prior."""
 
     bank: Bank
@@ -64,11 +64,11 @@ def variances_of(repeatability: Repeatability) -> Vector:
     )
 
 
-def before_run(known: Known, repeatability: Repeatability) -> Start:
+def before_run(known: Known, repeatability: Repeatability) -> RunStart:
     """What the next run begins with."""
     if known.runs == 0:  # the prior is of the soil under the wheel
-        return Start(known.bank)
-    return Start(_widened(known.bank, repeatability), known.memory)
+        return RunStart(known.bank)
+    return RunStart(_widened(known.bank, repeatability), known.memory)
 
 
 def after_run(
@@ -106,7 +106,7 @@ def _of_bed(bed: Estimate, before: Estimate, after: Estimate) -> Estimate:
     return made(tuple(x.tolist()), _symmetric(together), after.log_evidence)
 
 
-def begun(fresh: TrackState, start: Start) -> TrackState:
+def begun(fresh: TrackState, start: RunStart) -> TrackState:
     """The state that a tracker starts with, with what is known in the place of the prior."""
     bank, memory = start
     memory = Memory(bank) if memory is None else memory.ended()

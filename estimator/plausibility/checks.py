@@ -10,14 +10,16 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.plausibility import forces, motion
 from gritd.estimator.plausibility.contradiction import Contradiction
-from gritd.estimator.plausibility.driven import Driven
+from gritd.estimator.plausibility.driven import DrivenRun
 from gritd.estimator.plausibility.mistakes import Sources
 
-Check = Callable[[Driven, Settings, Sources], Iterator[Contradiction]]
+Check = Callable[[DrivenRun, Settings, Sources], Iterator[Contradiction]]
 
 
 @np.errstate(all="ignore")  # numbers that are none stay none
-def contradictions(run: Driven, settings: Settings, sources: Sources) -> tuple[Contradiction, ...]:
+def contradictions(
+    run: DrivenRun, settings: Settings, sources: Sources
+) -> tuple[Contradiction, ...]:
     """What cannot be, each with the likeliest remedy. What follows from another is not told."""
 
     def found(*checks: Check) -> tuple[Contradiction, ...]:

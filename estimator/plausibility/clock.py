@@ -18,7 +18,7 @@ ENDS = 10  # readings at either end of a run that show a change of the interval
 
 
 @dataclass(frozen=True)
-class Clock:
+class ReadingTimes:
     """When a channel was read; times [s]."""
 
     interval: float  # between two readings, the median
@@ -29,11 +29,11 @@ class Clock:
     change: float = 1.0  # the interval at the end over that at the beginning
 
 
-def clock_of(stamps: Ints, angle: Array) -> Clock:
+def clock_of(stamps: Ints, angle: Array) -> ReadingTimes:
     """stamps: of the wheel's readings (n,) [ns], ascending; angle: what they say (n,)."""
     steps = np.diff(stamps) / NS
     if not steps.size:
-        return Clock(0.0, 0.0, 0)
+        return ReadingTimes(0.0, 0.0, 0)
 
     usual = float(np.median(steps))
     gaps = int(np.count_nonzero(steps > LATE * usual))
@@ -43,9 +43,9 @@ def clock_of(stamps: Ints, angle: Array) -> Clock:
 
     longest = int(np.argmax(steps))
     if steps[longest] < LEAP * usual or not _moves_around(angle, longest):
-        return Clock(usual, duration, gaps, change=change)
+        return ReadingTimes(usual, duration, gaps, change=change)
     at = float(stamps[longest] - stamps[0]) / NS
-    return Clock(usual, duration, gaps, float(steps[longest]), at, change)
+    return ReadingTimes(usual, duration, gaps, float(steps[longest]), at, change)
 
 
 def _moves_around(angle: Array, place: int) -> bool:

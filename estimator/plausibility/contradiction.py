@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.plausibility.driven import Course
+from gritd.estimator.plausibility.driven import RunWindows
 from gritd.estimator.terramechanics.soil import Array, Wheel
 
 LEAST = 5  # windows that tell of a run
@@ -31,7 +31,7 @@ def told(kind: str, fact: str, likely: list[str]) -> Contradiction:
     return Contradiction(f"{kind}: {remedy}", f"{fact}: {remedy}" if likely else fact)
 
 
-def load_of(course: Course, settings: Settings) -> float:
+def load_of(course: RunWindows, settings: Settings) -> float:
     """Usual size of the load [N] while driving."""
     load = course.load[course.driving & np.isfinite(course.load)]
     return abs(float(np.median(load))) if load.size else settings.load.nominal.value

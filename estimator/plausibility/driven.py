@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import UNMEASURED, Calibration, Channel, Settings
 from gritd.estimator.messages.readings import ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.offline.windows import Bools, Ints, lines, members
-from gritd.estimator.plausibility.clock import Clock, clock_of, wrap_of
+from gritd.estimator.plausibility.clock import ReadingTimes, clock_of, wrap_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel import window_choice
 from gritd.estimator.wheel.window_choice import Cadence
@@ -33,7 +33,7 @@ class Raw(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Course:
+class RunWindows:
     """Windows of a run, arrays (n,) in SI, NaN where nothing is known."""
 
     rim: Array  # rω [m/s]
@@ -63,12 +63,12 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenRun:
     """A run: its course, its clock and what is stated of it."""
 
     name: str
-    course: Course
-    clock: Clock
+    course: RunWindows
+    clock: ReadingTimes
     window: float  # [s] of the filter
     slip_sigma: float  # of slip in one window, by the noise of the encoders; inf for unknown
     stated_load: float | None  # [N]
@@ -78,14 +78,14 @@ class Driven:
 @np.errstate(all="ignore")  # numbers that are none stay none
 def driven(
     name: str, raw: Mapping[str, Raw], settings: Settings, stated_load: float | None
-) -> Driven:
+) -> DrivenRun:
     """A run from the raw readings of its channels, each in the order of its stamps; some may be
     missing.
     """
     wheel = raw.get("wheel_encoder")
     if wheel is None or wheel.stamps.size < LEAST:
-        nothing = Course(*(np.zeros(0),) * 6, np.zeros(0, bool))
-        return Driven(name, nothing, Clock(0.0, 0.0, 0), 0.0, inf, stated_load)
+        nothing = RunWindows(*(np.zeros(0),) * 6, np.zeros(0, bool))
+        return DrivenRun(name, nothing, ReadingTimes(0.0, 0.0, 0), 0.0, inf, stated_load)
 
     scale = settings.channels["wheel_encoder"].calibration.scale.value
     angle = wheel.values * scale
@@ -95,7 +95,7 @@ def driven(
     course = course_of(raw, settings, window)
     cadences = _cadences(raw, settings)
     sigma = _slip_sigma(settings, course, cadences, window)
-    return Driven(name, course, clock, window, sigma, stated_load, wrap_of(angle))
+    return DrivenRun(name, course, clock, window, sigma, stated_load, wrap_of(angle))
 
 
 def _length(raw: Mapping[str, Raw], settings: Settings, interval: float) -> float:
@@ -113,7 +113,7 @@ def _length(raw: Mapping[str, Raw], settings: Settings, interval: float) -> floa
     return max(window_choice.chosen(settings, speeds, cadences) / NS, least)
 
 
-def _speeds(settings: Settings, course: Course) -> tuple[float, float]:
+def _speeds(settings: Settings, course: RunWindows) -> tuple[float, float]:
     """Usual speeds of wheel [rad/s] and carriage [m/s] while driving; NaN where there are none."""
     rim, travel = course.rim[course.driving], course.travel[course.driving]
     known = np.isfinite(travel)
@@ -133,7 +133,7 @@ def _cadences(raw: Mapping[str, Raw], settings: Settings) -> dict[str, Cadence]:
 
 
 def _slip_sigma(
-    settings: Settings, course: Course, cadences: Mapping[str, Cadence], window: float
+    settings: Settings, course: RunWindows, cadences: Mapping[str, Cadence], window: float
 ) -> float:
     speeds = _speeds(settings, course)
     if len(cadences) < len(ENCODERS) or not all(isfinite(v) and v > 0.0 for v in speeds):
@@ -144,7 +144,7 @@ def _slip_sigma(
 # --- windows ---
 
 
-def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> Course:
+def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> RunWindows:
     """The windows of so many seconds in which the wheel was read."""
     after, until = _edges(raw["wheel_encoder"].stamps, round(window * NS))
     none = np.full(after.size, nan)
@@ -170,7 +170,7 @@ def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> Cour
         }
 
     torque = {"wrench": axes["ty"], "motor_shunt": current * constant}
-    made = Course(
+    made = RunWindows(
         rim,
         travel,
         sinkage,
@@ -182,7 +182,7 @@ def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> Cour
     return with_driving(made, noise)
 
 
-def with_driving(course: Course, noise: Array) -> Course:
+def with_driving(course: RunWindows, noise: Array) -> RunWindows:
     """With the windows marked in which the wheel drives; noise: of the rim's speed (n,) [m/s]."""
     speed = np.abs(np.nan_to_num(course.rim))
     fastest = float(np.percentile(speed, 95.0)) if speed.size else 0.0

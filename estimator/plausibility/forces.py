@@ -23,7 +23,7 @@ from gritd.estimator.plausibility.contradiction import (
     load_of,
     told,
 )
-from gritd.estimator.plausibility.driven import Course, Driven
+from gritd.estimator.plausibility.driven import DrivenRun, RunWindows
 from gritd.estimator.plausibility.mistakes import Sources, remedies, turned
 from gritd.estimator.terramechanics.soil import Array, Soil
 
@@ -35,7 +35,7 @@ CLEAR = 0.7  # share of pairs that fall less those that rise; of constant slip i
 SMALL = 0.5  # slip up to which the pull rises with it in every soil
 
 
-def sinkage(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def sinkage(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     course, radius = run.course, settings.wheel.radius
     touching = course.driving & ~(course.load < settings.load.minimum)
     known = course.sinkage[touching & np.isfinite(course.sinkage)]
@@ -67,7 +67,7 @@ def sinkage(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contr
             )
 
 
-def _highest(course: Course) -> float:
+def _highest(course: RunWindows) -> float:
     """The sinkage [m] that is hardly ever passed in the run: before it a wheel may hang."""
     return float(np.percentile(course.sinkage[np.isfinite(course.sinkage)], 100.0 * MOST))
 
@@ -76,7 +76,7 @@ def _usual(sinkage: float, radius: float) -> bool:
     return FEW * radius < abs(sinkage) < radius
 
 
-def _expected_sinkage(course: Course, settings: Settings) -> float:
+def _expected_sinkage(course: RunWindows, settings: Settings) -> float:
     """By the stated soil under the load [m]."""
     soil, wheel = settings.soil, settings.wheel
     load = load_of(course, settings)
@@ -91,7 +91,7 @@ def _expected_sinkage(course: Course, settings: Settings) -> float:
     return float(wheel.radius * (1.0 - np.cos(angle[0])))
 
 
-def load(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def load(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     load = run.course.load[run.course.driving]
     load = load[np.isfinite(load)]
     if load.size < LEAST:
@@ -116,7 +116,7 @@ def load(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
     )
 
 
-def torque(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def torque(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     """Where slip is positive, soil is sheared backward all along the contact (Eq. 6): T > 0."""
     course = run.course
     known = course.driving & np.isfinite(course.torque)
@@ -137,7 +137,7 @@ def torque(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contra
 
 
 def _strength(
-    usual: float, course: Course, known: Bools, settings: Settings, sources: Sources
+    usual: float, course: RunWindows, known: Bools, settings: Settings, sources: Sources
 ) -> Iterator[Contradiction]:
     """Soil takes c A + tan φ W / cos θ₁ at most, as its bounds are, and hardly a tenth of the least
     friction only where another unit is meant.
@@ -164,13 +164,13 @@ def _strength(
         yield told("idle", f"torque is {usual:.2g} N·m under {load:.3g} N", likely)
 
 
-def pull(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def pull(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     if load_of(run.course, settings) > settings.load.minimum:
         found = _falling(run.course, settings, sources) or _beyond(run.course, settings, sources)
         yield from [found] if found else []
 
 
-def _falling(course: Course, settings: Settings, sources: Sources) -> Contradiction | None:
+def _falling(course: RunWindows, settings: Settings, sources: Sources) -> Contradiction | None:
     """The pull rises with the torque; where that is not known, with slip while it is small."""
     slip = np.full(course.pull.size, np.nan)
     slip[course.driving] = course.slip
@@ -191,7 +191,7 @@ def _falling(course: Course, settings: Settings, sources: Sources) -> Contradict
     return told("falling pull", fact, [turned("pull", sources)])
 
 
-def _beyond(course: Course, settings: Settings, sources: Sources) -> Contradiction | None:
+def _beyond(course: RunWindows, settings: Settings, sources: Sources) -> Contradiction | None:
     """The pull is that of stresses which turn the wheel with the measured torque."""
     known = course.driving & np.isfinite(course.torque + course.pull)
     known[course.driving] &= course.slip > 0.0
@@ -238,7 +238,7 @@ def _together(pull: Array, other: Array, load: Array, apart: float) -> float:
 
 
 def _bounds(
-    course: Course, known: Bools, settings: Settings, shear: Array, load: Array
+    course: RunWindows, known: Bools, settings: Settings, shear: Array, load: Array
 ) -> tuple[Array, Array]:
     """Least and largest pull (m,) [N] of stresses that turn the wheel with this torque; shear:
     T/r (m,) [N]; load (m,) [N].

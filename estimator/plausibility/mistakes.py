@@ -48,7 +48,7 @@ class Remedy:
 
 
 @dataclass(frozen=True)
-class Source:
+class QuantitySource:
     """Where a quantity comes from: a column with a unit, or a channel of a recording."""
 
     name: str  # as the user knows it
@@ -62,14 +62,16 @@ class Source:
         return self.channel.endswith("speed")
 
 
-Sources = Mapping[str, Source]  # by quantity: time, wheel, carriage, sinkage, load, torque, pull
+Sources = Mapping[
+    str, QuantitySource
+]  # by quantity: time, wheel, carriage, sinkage, load, torque, pull
 OF_A_RECORDING: Sources = {
-    "wheel": Source("wheel_encoder"),
-    "carriage": Source("carriage_encoder"),
-    "sinkage": Source("sinkage_pot"),
-    "load": Source("load of the wrench"),
-    "torque": Source("torque"),
-    "pull": Source("drawbar_pull of the wrench"),
+    "wheel": QuantitySource("wheel_encoder"),
+    "carriage": QuantitySource("carriage_encoder"),
+    "sinkage": QuantitySource("sinkage_pot"),
+    "load": QuantitySource("load of the wrench"),
+    "torque": QuantitySource("torque"),
+    "pull": QuantitySource("drawbar_pull of the wrench"),
 }
 
 
@@ -88,7 +90,7 @@ def remedies(quantity: str, sources: Sources) -> list[Remedy]:
     ]
 
 
-def _of_column(quantity: str, source: Source) -> list[Remedy]:
+def _of_column(quantity: str, source: QuantitySource) -> list[Remedy]:
     """Units that a column may have in the place of that of the map."""
     called = f"{quantity} ({source.name})" if source.name != quantity else quantity
     return [
@@ -108,7 +110,7 @@ def _of_scale(name: str, taken: str, per: float, units: Mapping[str, float]) -> 
 
 def turned(quantity: str, sources: Sources) -> str:
     """How the sign of a quantity is turned."""
-    source = sources.get(quantity, Source(quantity))
+    source = sources.get(quantity, QuantitySource(quantity))
     if source.channel:
         return f"factor: -1 for {source.name} turns it"
     return f"the scale of {source.name} turns it"

@@ -16,7 +16,7 @@ from gritd.estimator.plausibility.contradiction import (
     load_of,
     told,
 )
-from gritd.estimator.plausibility.driven import Course, Driven
+from gritd.estimator.plausibility.driven import DrivenRun, RunWindows
 from gritd.estimator.plausibility.mistakes import Sources, remedies, turned
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.window_choice import LENGTHS
@@ -31,7 +31,7 @@ BRAKED, SPINNING = -0.5, 0.85  # slip while driving beyond which a unit is asked
 RATIO = (0.02, 1.2)  # v / rω of a wheel that drives
 
 
-def clock(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def clock(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     own = run.clock
     if own.leap:
         yield told(
@@ -54,7 +54,7 @@ def clock(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contrad
         yield told("window", fact, _times(run, sources))
 
 
-def _times(run: Driven, sources: Sources) -> list[str]:
+def _times(run: DrivenRun, sources: Sources) -> list[str]:
     """Units of time with which interval and speed are usual."""
     rim, speed = _rim(run.course), "wheel" in sources and sources["wheel"].speed
     low, high = USUAL
@@ -67,12 +67,12 @@ def _times(run: Driven, sources: Sources) -> list[str]:
     ]
 
 
-def _rim(course: Course) -> float:
+def _rim(course: RunWindows) -> float:
     """Usual speed of the rim [m/s]; 0 where it does not turn."""
     return float(np.median(np.abs(course.rim[course.driving]))) if course.count else 0.0
 
 
-def speed(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def speed(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     """Above √(g r) soil is thrown, and no equation of statics holds."""
     rim, fastest = _rim(run.course), (GRAVITY * settings.wheel.radius) ** 0.5
     if run.course.count < LEAST or SLOWEST <= rim <= fastest or run.clock.interval > LONGEST:
@@ -92,7 +92,7 @@ def speed(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contrad
     yield told("fast", f"the rim moves at {rim:.3g} m/s, beyond √(g r) = {fastest:.2g} m/s", likely)
 
 
-def hidden(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def hidden(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     """A wheel that turns one way in nearly all windows, in none of them faster than its noise."""
     rim = run.course.rim[np.isfinite(run.course.rim)]
     if run.course.count or rim.size < 2 * LEAST or abs(np.mean(np.sign(rim))) < MOST:
@@ -106,7 +106,7 @@ def hidden(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contra
     )
 
 
-def wrap(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def wrap(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     if run.wrap:
         turns = run.wrap / (2.0 * np.pi)
         source = sources["wheel"]
@@ -118,7 +118,7 @@ def wrap(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
         )
 
 
-def slip(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+def slip(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     course = run.course
     known = course.driving & np.isfinite(course.travel)
     if np.count_nonzero(known) < LEAST:
@@ -148,7 +148,7 @@ def slip(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
         yield told("spinning", f"slip is {slip:.2f} throughout", likely)._replace(alone=False)
 
 
-def _drives(course: Course, settings: Settings) -> bool:
+def _drives(course: RunWindows, settings: Settings) -> bool:
     """Whether torque or pull are those of a wheel that drives, in a tenth of the windows: one that
     skids takes no torque, and the soil holds it back.
     """
@@ -162,7 +162,7 @@ def _drives(course: Course, settings: Settings) -> bool:
     return False
 
 
-def _sheared(course: Course, settings: Settings) -> bool:
+def _sheared(course: RunWindows, settings: Settings) -> bool:
     """Whether the torque is that of soil which is sheared to its strength, as where a wheel spins:
     T/r ≥ tan φ W / (1 + tan φ sin θ), with its stresses at one angle θ.
     """

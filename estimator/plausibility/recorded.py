@@ -11,11 +11,11 @@ from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.messages.readings import CHANNELS
 from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.offline.streams import RAW
-from gritd.estimator.plausibility.driven import Driven, Raw, driven
+from gritd.estimator.plausibility.driven import DrivenRun, Raw, driven
 from gritd.estimator.recording.recording import Recording
 
 
-def driven_recording(recording: Recording, settings: Settings) -> tuple[Driven, Settings]:
+def driven_recording(recording: Recording, settings: Settings) -> tuple[DrivenRun, Settings]:
     """The run, and the settings that hold for it. Raises RecordingError."""
     settings = settings_of_run(without_absent(settings, recording), recording.run)
     tables = recording.tables(RAW)

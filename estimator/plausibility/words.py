@@ -10,7 +10,7 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.plausibility.checks import contradictions
 from gritd.estimator.plausibility.contradiction import Contradiction
-from gritd.estimator.plausibility.driven import Driven
+from gritd.estimator.plausibility.driven import DrivenRun
 from gritd.estimator.plausibility.mistakes import OF_A_RECORDING, Sources
 from gritd.estimator.terramechanics.soil import Array
 
@@ -30,14 +30,14 @@ HEADING = (
 DASH = "–"
 
 
-def told(given: Sequence[tuple[Driven, Settings]], sources: Sources) -> Iterator[str]:
+def told(given: Sequence[tuple[DrivenRun, Settings]], sources: Sources) -> Iterator[str]:
     """The table, then what cannot be."""
     yield from table(given)
     yield from warnings(given, sources)
 
 
 def warnings(
-    given: Sequence[tuple[Driven, Settings]], sources: Sources = OF_A_RECORDING
+    given: Sequence[tuple[DrivenRun, Settings]], sources: Sources = OF_A_RECORDING
 ) -> Iterator[str]:
     """A line for each thing that physics or the configuration forbids, with the likely remedy; of
     several runs that differ in figures alone, the first is quoted.
@@ -65,7 +65,7 @@ def _named(name: str, count: int, of: int) -> str:
 # --- the table ---
 
 
-def table(given: Sequence[tuple[Driven, Settings]]) -> Iterator[str]:
+def table(given: Sequence[tuple[DrivenRun, Settings]]) -> Iterator[str]:
     """A row a run: usual ranges, 5 to 95 % of the windows in which the wheel drives."""
     yield "while the wheel drives, 5 to 95 % of the windows:"
     rows = [HEADING, *(_row(run, settings) for run, settings in given)]
@@ -77,7 +77,7 @@ def table(given: Sequence[tuple[Driven, Settings]]) -> Iterator[str]:
 
 
 @np.errstate(all="ignore")  # numbers that are none stay none
-def _row(run: Driven, settings: Settings) -> tuple[str, ...]:
+def _row(run: DrivenRun, settings: Settings) -> tuple[str, ...]:
     clock, course = run.clock, run.course
     driving, radius = course.driving, settings.wheel.radius
     load = course.load[driving] if np.isfinite(course.load).any() else settings.load.nominal.value

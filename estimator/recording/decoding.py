@@ -27,7 +27,7 @@ CDR_LE = 0x0100
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordedChannel:
     """One channel of the file as defined there, and how to decode it; `codec` is None where we
     cannot.
     """
@@ -43,14 +43,14 @@ class Source:
         assert self.codec is not None
         return self.codec.record_dtype(MESSAGE_HEAD.size)
 
-    def fill(self, table: Rows, chunk: Chunk, own: Starts) -> None:
+    def fill(self, table: Rows, chunk: MessageHeads, own: Starts) -> None:
         """Decode the messages numbered `own`, shape (n,), of a chunk into a table of n rows, by
         field name.
         """
         assert self.codec is not None
         self.codec.fill(table, gather(chunk.content, chunk.starts[own], self.dtype))
 
-    def values(self, chunk: Chunk, own: Starts) -> list[tuple[Any, ...]]:
+    def values(self, chunk: MessageHeads, own: Starts) -> list[tuple[Any, ...]]:
         """The values of the messages numbered `own`, shape (n,): n tuples in the order of the
         topic's fields.
         """
@@ -66,7 +66,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Chunk:
+class MessageHeads:
     """The good messages of one block: where their records begin in `content`, and their heads,
     shape (n,).
 
@@ -104,12 +104,12 @@ class Chunk:
 
 
 def select(
-    content: bytes, starts: Starts, sources: Mapping[int, Source]
-) -> tuple[Chunk, list[str]]:
+    content: bytes, starts: Starts, sources: Mapping[int, RecordedChannel]
+) -> tuple[MessageHeads, list[str]]:
     """The messages that are of a known channel and as long as its fields, and one line for each
     kind of others. starts: byte offsets of the records in `content`, shape (n,).
     """
-    whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
+    whole = MessageHeads(content, starts, gather(content, starts, MESSAGE_DTYPE))
 
     good = np.zeros(starts.shape, bool)
     complaints = []
@@ -124,10 +124,12 @@ def select(
             )
             complaints.append(f"{bad} messages skipped: they {what}")
 
-    return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
+    return (
+        whole if good.all() else MessageHeads(content, starts[good], whole.heads[good])
+    ), complaints
 
 
-def sound(chunk: Chunk, own: Starts, source: Source) -> Any:
+def sound(chunk: MessageHeads, own: Starts, source: RecordedChannel) -> Any:
     """Which of the messages numbered `own` are little-endian CDR of the right length, shape
     (n,).
     """

@@ -11,7 +11,7 @@ from mcap.records import Channel, Schema
 
 from gritd.estimator.recording.blocks import Damaged, Texts, records
 from gritd.estimator.recording.cdr import CODES, TIME, Codec, Field, Topic, parse_schema
-from gritd.estimator.recording.decoding import Source
+from gritd.estimator.recording.decoding import RecordedChannel
 from gritd.estimator.recording.mcapfile import RecordingError
 
 ROOM = 16 << 20  # [bytes] of all definitions that differ
@@ -24,7 +24,7 @@ class Definitions:
     """
 
     def __init__(self, path: Path, known: dict[str, Topic]) -> None:
-        self.sources: dict[int, Source] = {}
+        self.sources: dict[int, RecordedChannel] = {}
         self._path, self._known = path, known
         self._schemas: dict[int, Schema] = {}
         self._seen: set[tuple[int, bytes]] = set()  # definitions are repeated in every chunk
@@ -71,7 +71,7 @@ class Definitions:
         elif self.sources[channel.id].channel != channel:
             raise Damaged(f"channel {channel.id} is defined twice, differently")
 
-    def _source(self, channel: Channel) -> Source:
+    def _source(self, channel: Channel) -> RecordedChannel:
         schema = self._schemas.get(channel.schema_id)
         if schema is None and channel.schema_id:
             raise Damaged(
@@ -86,7 +86,7 @@ class Definitions:
         if known:
             _require(self._path, known, codec)
         topic = known or Topic(channel.topic, schema.name if schema else "", fields or ())
-        return Source(schema, channel, topic, codec)
+        return RecordedChannel(schema, channel, topic, codec)
 
 
 @lru_cache(maxsize=32)  # the recordings of a campaign define the same messages

@@ -23,7 +23,7 @@ from gritd.estimator.compiled import records
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.blocks import Block, Unpacker
 from gritd.estimator.recording.cdr import Rows
-from gritd.estimator.recording.decoding import CDR_LE, PADDING, Chunk, Source, sound
+from gritd.estimator.recording.decoding import CDR_LE, PADDING, MessageHeads, RecordedChannel, sound
 from gritd.estimator.recording.message_records import (
     MESSAGE_DTYPE,
     MESSAGE_HEAD,
@@ -51,17 +51,17 @@ Ranges = dict[int, tuple[int, int, int]]  # channel -> first number, last number
 class Pile(NamedTuple):
     """The messages of some blocks."""
 
-    chunk: Chunk  # of all of them
+    chunk: MessageHeads  # of all of them
     cuts: Starts  # (blocks + 1,) the number of the first message of each block, and how many
     preambles: tuple[bytes, ...]  # (blocks) what stands before the messages of each
 
-    def parts(self) -> list[Chunk]:
+    def parts(self) -> list[MessageHeads]:
         """The messages block by block."""
         if len(self.cuts) == 2:
             return [self.chunk]
         edges = self.cuts.tolist()
         content, starts, heads = self.chunk.content, self.chunk.starts, self.chunk.heads
-        return [Chunk(content, starts[a:b], heads[a:b]) for a, b in pairwise(edges)]
+        return [MessageHeads(content, starts[a:b], heads[a:b]) for a, b in pairwise(edges)]
 
     def ranges(self) -> list[Ranges]:
         """The messages' numbers in each block, channel by channel."""
@@ -82,13 +82,16 @@ class Pile(NamedTuple):
         return of_blocks
 
 
-def alone(chunk: Chunk) -> Pile:
+def alone(chunk: MessageHeads) -> Pile:
     """A pile of one block."""
     return Pile(chunk, np.array([0, len(chunk.starts)]), ())
 
 
 def opened(
-    file: BinaryIO, blocks: Sequence[Block], sources: Mapping[int, Source], unpacker: Unpacker
+    file: BinaryIO,
+    blocks: Sequence[Block],
+    sources: Mapping[int, RecordedChannel],
+    unpacker: Unpacker,
 ) -> Pile | None:
     """The messages of neighbouring blocks; None where anything about one of them is not as it
     should be, or its writer left no message index.
@@ -118,8 +121,8 @@ def _bases(ends: Starts) -> Starts:
 
 
 def _walked(
-    content: bytes, ends: Starts, sources: Mapping[int, Source]
-) -> tuple[Chunk, Starts] | None:
+    content: bytes, ends: Starts, sources: Mapping[int, RecordedChannel]
+) -> tuple[MessageHeads, Starts] | None:
     """The messages of joined blocks that end at `ends`, and the cuts between them, by walking from
     head to head.
     """
@@ -136,7 +139,9 @@ def _walked(
     order = np.frombuffer(numbers, np.int64)
     edges = pairwise(accumulate(counts.values(), initial=0))
     groups = {channel: order[a:b] for channel, (a, b) in zip(counts, edges, strict=True)}
-    chunk = Chunk(content, np.frombuffer(starts, np.int64), np.frombuffer(heads, _HEAD), groups)
+    chunk = MessageHeads(
+        content, np.frombuffer(starts, np.int64), np.frombuffer(heads, _HEAD), groups
+    )
 
     loose = (channel for channel in groups if sizes[channel] == records.NOT_FIXED)
     if not all(np.all(sound(chunk, groups[channel], sources[channel])) for channel in loose):
@@ -148,8 +153,8 @@ def _pointed(
     content: bytes,
     ends: Starts,
     indexes: Sequence[tuple[int, memoryview]],
-    sources: Mapping[int, Source],
-) -> tuple[Chunk, Starts] | None:
+    sources: Mapping[int, RecordedChannel],
+) -> tuple[MessageHeads, Starts] | None:
     """The same, where the message indexes point to."""
     bases = _bases(ends)
     starts = _starts(indexes, bases, len(content))
@@ -163,11 +168,11 @@ def _pointed(
     if not _tiled(starts, heads, cuts, ends):
         return None
 
-    chunk = Chunk(content, starts, heads)
+    chunk = MessageHeads(content, starts, heads)
     return (chunk, cuts) if _sound(chunk, sources) else None
 
 
-def _sound(chunk: Chunk, sources: Mapping[int, Source]) -> bool:
+def _sound(chunk: MessageHeads, sources: Mapping[int, RecordedChannel]) -> bool:
     """Whether every message is of a known channel and fits its fields: `decoding.sound` of all
     channels at once.
     """

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.recording.cdr import ALIASES, BILLION, TIME, Rows
-from gritd.estimator.recording.decoding import CDR_LE, Chunk, Source
+from gritd.estimator.recording.decoding import CDR_LE, MessageHeads, RecordedChannel
 from gritd.estimator.recording.message_records import MESSAGE_HEAD, gather
 
 Times = NDArray[np.int64]
@@ -45,7 +45,9 @@ class LogTimes:
         return self._none <= MOST * self._count and differ
 
 
-def received(chunks: Iterable[Chunk], sources: Mapping[int, Source]) -> tuple[Times | None, str]:
+def received(
+    chunks: Iterable[MessageHeads], sources: Mapping[int, RecordedChannel]
+) -> tuple[Times | None, str]:
     """Times [ns] of all messages in file order, shape (n,), in place of log times that are none,
     and where they are from; None where nothing tells.
     """
@@ -68,7 +70,7 @@ def received(chunks: Iterable[Chunk], sources: Mapping[int, Source]) -> tuple[Ti
     return None, ""
 
 
-def _begins_with_stamp(source: Source) -> bool:
+def _begins_with_stamp(source: RecordedChannel) -> bool:
     """Whether the first field of a message is a time, or a header, which begins with one."""
     schema = source.schema
     if schema is None or schema.encoding != "ros2msg" or source.channel.message_encoding != "cdr":
@@ -78,7 +80,7 @@ def _begins_with_stamp(source: Source) -> bool:
     return kind in HEADERS or ALIASES.get(kind, kind) == TIME
 
 
-def _stamps(chunk: Chunk, own: Times) -> Times:
+def _stamps(chunk: MessageHeads, own: Times) -> Times:
     """The stamps of messages (n,) [ns]; 0 of one that is too short or in another encoding."""
     end = MESSAGE_HEAD.size + _STAMP.itemsize
     fits = chunk.starts[own] + end <= len(chunk.content)

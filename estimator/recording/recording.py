@@ -15,7 +15,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.attachments import AttachmentPlace
 from gritd.estimator.recording.blocks import Block, Unpacker, split, unpack
 from gritd.estimator.recording.cdr import Rows, Topic
-from gritd.estimator.recording.decoding import Chunk, Source, select
+from gritd.estimator.recording.decoding import MessageHeads, RecordedChannel, select
 from gritd.estimator.recording.mcapfile import RecordingError, opened, reported
 from gritd.estimator.recording.metadata import CONFIG, RECOVERED, RUN
 from gritd.estimator.recording.piles import Pile, alone
@@ -45,7 +45,7 @@ class Recording:
     attachments: list[AttachmentPlace] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # what is odd, though nothing is missing
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
-    sources: dict[int, Source] = field(default_factory=dict)  # by channel number
+    sources: dict[int, RecordedChannel] = field(default_factory=dict)  # by channel number
     _piles: list[tuple[Block, ...]] = field(default_factory=list, repr=False)
     _kept: dict[int, Pile] = field(default_factory=dict, repr=False)
     _tables: dict[tuple[str, Fields], Rows] = field(default_factory=dict, repr=False)
@@ -72,7 +72,7 @@ class Recording:
         """The topics that can be decoded, by name."""
         return {source.topic.name: source.topic for source in self.sources.values() if source.codec}
 
-    def chunks(self) -> Iterator[Chunk]:
+    def chunks(self) -> Iterator[MessageHeads]:
         """The good messages, block by block in file order, still encoded."""
         for pile in self._opened():
             yield from pile.parts()
@@ -183,6 +183,6 @@ class Recording:
                 for block in blocks:
                     yield alone(self._chunk(file, block))
 
-    def _chunk(self, file: BinaryIO, block: Block) -> Chunk:
+    def _chunk(self, file: BinaryIO, block: Block) -> MessageHeads:
         content = unpack(file, block)
         return select(content, split(file, block, content)[0], self.sources)[0]

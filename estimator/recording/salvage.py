@@ -22,7 +22,7 @@ from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import Block, Damaged, Unpacker, records, split, unpack
 from gritd.estimator.recording.cdr import Topic
-from gritd.estimator.recording.decoding import Chunk, select
+from gritd.estimator.recording.decoding import MessageHeads, select
 from gritd.estimator.recording.definitions import Definitions
 from gritd.estimator.recording.mcapfile import LIBRARY, MAGIC, RecordingError, reported
 from gritd.estimator.recording.mcapfile import opened as file_opened
@@ -31,7 +31,7 @@ from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
 from gritd.estimator.recording.piles import REACH, ROOM, Pile, alone, opened
 from gritd.estimator.recording.received import LogTimes, received
 from gritd.estimator.recording.recording import Message, Recording
-from gritd.estimator.recording.sequence import Sequence as Numbers
+from gritd.estimator.recording.sequence import ChunkSequence as Numbers
 from gritd.estimator.recording.tables import NOTHING, Fields, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.recording.walk import Contents, Walk
@@ -291,7 +291,7 @@ class RecordingCheck:
         if len(starts):
             self._note(content[: int(starts[0])])
 
-    def _place(self, block: Block, chunk: Chunk) -> None:
+    def _place(self, block: Block, chunk: MessageHeads) -> None:
         """Hold the messages' numbers against those before. Raises Damaged for a chunk that stands
         there twice.
         """

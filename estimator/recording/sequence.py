@@ -23,7 +23,7 @@ class _Counted:
         return _ahead(self.last, self.first) + 1 - self.count
 
 
-class Sequence:
+class ChunkSequence:
     """Follows the chunks of a file in file order."""
 
     def __init__(self) -> None:

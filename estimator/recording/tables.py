@@ -16,7 +16,7 @@ import numpy as np
 
 from gritd.estimator.compiled import records
 from gritd.estimator.recording.cdr import BILLION, TIME, Codec, Rows, Topic
-from gritd.estimator.recording.decoding import Chunk, Source
+from gritd.estimator.recording.decoding import MessageHeads, RecordedChannel
 from gritd.estimator.recording.message_records import MESSAGE_HEAD, Starts, gather
 
 Fields = tuple[str, ...] | None  # of a topic; None for all of them
@@ -43,7 +43,7 @@ class _Copy(NamedTuple):
     pieces: tuple[str, ...]  # fields of both
     times: tuple[tuple[str, str, str], ...]  # field of the row; seconds and nanoseconds in `record`
 
-    def into(self, rows: Rows, chunk: Chunk, own: Starts, before: int) -> None:
+    def into(self, rows: Rows, chunk: MessageHeads, own: Starts, before: int) -> None:
         """Decode the messages numbered `own`, shape (n,), into n rows that lie side by side;
         `before` are in the file before the chunk.
         """
@@ -65,7 +65,7 @@ class _CompiledCopy(NamedTuple):
     pieces: tuple[tuple[int, int, int], ...]  # place in the record, in the row, bytes
     times: tuple[tuple[int, int, int], ...]  # place of the seconds, in the row, of the nanoseconds
 
-    def into(self, rows: Rows, chunk: Chunk, own: Starts, before: int) -> None:
+    def into(self, rows: Rows, chunk: MessageHeads, own: Starts, before: int) -> None:
         """As `_Copy.into`."""
         records.fill(
             chunk.content, chunk.starts, own, rows, self.reach, before, self.pieces, self.times
@@ -89,7 +89,7 @@ class Table:
         except MemoryError:  # so many there may never be
             self._rows = np.empty(0, self.dtype)
 
-    def fits(self, source: Source) -> bool:
+    def fits(self, source: RecordedChannel) -> bool:
         """Whether messages of a source hold the fields of the table, and if all are asked for, no
         others.
         """
@@ -98,7 +98,11 @@ class Table:
         return set(self._names) <= set(source.codec.names)
 
     def add(
-        self, chunk: Chunk, sources: Mapping[int, Source], channels: list[int], before: int
+        self,
+        chunk: MessageHeads,
+        sources: Mapping[int, RecordedChannel],
+        channels: list[int],
+        before: int,
     ) -> None:
         """The messages of these channels, all of the table's topic; `before` are in the file before
         the chunk.
@@ -133,7 +137,7 @@ class Table:
             self._rows.resize(self._used + self._used // 8, refcheck=False)
         return self._rows[start : self._used]
 
-    def _copy(self, channel: int, source: Source) -> _Copy | _CompiledCopy:
+    def _copy(self, channel: int, source: RecordedChannel) -> _Copy | _CompiledCopy:
         if channel not in self._copies:
             assert source.codec is not None
             self._copies[channel] = _copy_of(source.codec, self._names, self.dtype, records.BUILT)
@@ -152,7 +156,7 @@ class Tables:
         self.refused = set[str]()  # topics of which a channel lacks a field
         self._tables: dict[str, Table] = {}
 
-    def begin(self, sources: Mapping[int, Source]) -> None:
+    def begin(self, sources: Mapping[int, RecordedChannel]) -> None:
         """Once it is known which topics there are, and how many messages of each: all are made if
         they fit in ROOM.
         """
@@ -163,7 +167,7 @@ class Tables:
         if sum(sizes) <= ROOM:
             self.wanted = dict.fromkeys(topics)
 
-    def add(self, chunk: Chunk, sources: Mapping[int, Source], before: int) -> None:
+    def add(self, chunk: MessageHeads, sources: Mapping[int, RecordedChannel], before: int) -> None:
         """The messages of a chunk that `before` messages of the file stand before."""
         if not self.wanted:
             return

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gritd.estimator.terramechanics.moments import Kernels, Maths, Numbers, Value, kernels
+from gritd.estimator.terramechanics.moments import Kernels, Maths, OneSample, Value, kernels
 
-NUMBERS: Maths = Numbers()
+NUMBERS: Maths = OneSample()
 Both = tuple[Kernels, Kernels]  # without and with the factor e^(−iθ₁v)
 
 

@@ -70,7 +70,7 @@ class Shift(NamedTuple):
     peak: Integrals
 
 
-class Prediction(NamedTuple):
+class ClosedFormPrediction(NamedTuple):
     """What the closed forms say of a wheel under load, and the gradients in the order of
     GRADIENT.
     """
@@ -84,7 +84,7 @@ class Prediction(NamedTuple):
     resistance_gradient: tuple[Value, ...]
 
 
-class Forces(NamedTuple):
+class LinearForces(NamedTuple):
     """What the soil does to the wheel."""
 
     drawbar_pull: Value  # DP [N], Eq. (20)
@@ -103,7 +103,7 @@ def predict(
     load: Value,
     maths: Maths = NUMBERS,
     shift: Shift | None = None,
-) -> Prediction:
+) -> ClosedFormPrediction:
     """T, DP, resistance and σₘ under a load W, with gradients with respect to GRADIENT. Eqs.
     (20)-(22), (19), (5).
 
@@ -135,14 +135,14 @@ def predict(
         columns = tuple(map(_summed, columns, at.along_shift(c, theta_1, shift)))
     forces = _forces(wheel, x, c * theta_1, tan_phi, s)
     gradients = tuple(zip(*columns, strict=True))
-    return Prediction(
+    return ClosedFormPrediction(
         forces.torque, forces.drawbar_pull, forces.resistance, maths.divide(s, theta_1), *gradients
     )
 
 
 def predict_batch(
     wheel: Wheel, c: Scalar, tan_phi: Scalar, k: Scalar, theta_1: Scalar, slip: Scalar, load: Scalar
-) -> Prediction:
+) -> ClosedFormPrediction:
     """`predict` for arrays: every argument a float or (n,); every field, and every entry of a
     gradient, (n,).
     """
@@ -153,7 +153,7 @@ def predict_batch(
     gradients = (
         tuple(np.broadcast_to(entry, shape) for entry in gradient) for gradient in prediction[4:]
     )
-    return Prediction(*prediction[:4], *gradients)
+    return ClosedFormPrediction(*prediction[:4], *gradients)
 
 
 def forces_under_load(
@@ -166,7 +166,7 @@ def forces_under_load(
     load: Value,
     maths: Maths = NUMBERS,
     shift: Shift | None = None,
-) -> Forces:
+) -> LinearForces:
     """`predict` without gradients: a third of its cost, for a search over slip."""
     x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
 
@@ -185,7 +185,7 @@ def forces(
     sigma_m: Value,
     maths: Maths = NUMBERS,
     shift: Shift | None = None,
-) -> Forces:
+) -> LinearForces:
     """DP, W, T and resistance for a given peak stress σₘ [Pa]. Eqs. (20)-(22)."""
     x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
 
@@ -271,14 +271,14 @@ def _scaled_peak(
     return (load / (wheel.radius * wheel.width) - c * theta_1 * x.b2) / (x.b1 + tan_phi * x.b3)
 
 
-def _forces(wheel: Wheel, x: Integrals, c: Value, tan_phi: Value, s: Value) -> Forces:
+def _forces(wheel: Wheel, x: Integrals, c: Value, tan_phi: Value, s: Value) -> LinearForces:
     """Eqs. (20)-(22) for c·θ₁ and s = σₘθ₁ [Pa·rad]."""
     area = wheel.radius * wheel.width
     resistance = area * s * x.c3
     drawbar_pull = area * (c * x.c1 + s * tan_phi * x.c2) - resistance  # Eq. (20)
     load = area * (s * (x.b1 + tan_phi * x.b3) + c * x.b2)  # Eq. (21)
     torque = wheel.radius * area * (c * x.a1 + s * tan_phi * x.a2)  # Eq. (22)
-    return Forces(drawbar_pull, load, torque, resistance)
+    return LinearForces(drawbar_pull, load, torque, resistance)
 
 
 def _added(x: Integrals, change: Integrals) -> Integrals:

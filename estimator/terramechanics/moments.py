@@ -16,7 +16,7 @@ Integration by parts gives for both a recurrence in n. Forward it is the closed 
 digit in BACKWARD steps. In both directions δₙ carries η as a factor, so that nothing is lost as
 f → 0.
 
-The same arithmetic serves numbers (`Numbers`, for the loop) and arrays (`Arrays`, for batches).
+The same arithmetic serves numbers (`OneSample`, for the loop) and arrays (`Arrays`, for batches).
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ _STRAIGHT: Triple = (_MU_0[0], _MU_0[1], _MU_0[2])
 _DOWN = _MU_0[BACKWARD - 1 : 1 : -1]
 
 
-class Numbers:
+class OneSample:
     """One sample, in plain floats and complex numbers."""
 
     sin = staticmethod(math.sin)

@@ -37,7 +37,7 @@ class Arc(NamedTuple):
     advance: Array  # sin θ₁ − sin θ
 
 
-class Contact(NamedTuple):
+class ContactStresses(NamedTuple):
     """Stresses at the nodes, rear zone first; each field (2·order, n), or (2·order,) for one
     sample.
     """
@@ -48,7 +48,7 @@ class Contact(NamedTuple):
     tau: Array  # shear stress, positive where it drives the wheel forward [Pa]
 
 
-class Forces(NamedTuple):
+class OriginalForces(NamedTuple):
     """What the soil does to the wheel; each field (n,), or 0-d for one sample."""
 
     drawbar_pull: Array  # DP [N], Eq. (8)
@@ -155,7 +155,7 @@ def contact(
     mobilisation: Mobilisation = janosi,
     side_slip: Scalar = 0.0,
     order: int = ORDER,
-) -> Contact:
+) -> ContactStresses:
     """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones."""
     peak = _peak(wheel, slip, theta_1) if theta_m is None else theta_m
     shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
@@ -173,10 +173,10 @@ def contact(
         along = displacement / np.maximum(total, UNMOVED)
         tau = shear_stress(soil, sigma, total, mobilisation) * along
 
-    return Contact(points, weight, sigma, tau)
+    return ContactStresses(points, weight, sigma, tau)
 
 
-def integrate(wheel: Wheel, contact: Contact) -> Forces:
+def integrate(wheel: Wheel, contact: ContactStresses) -> OriginalForces:
     """Forces on the wheel from the stresses on its rim, Eqs. (8)-(10)."""
     points = contact.points
     area = wheel.radius * wheel.width * contact.weight  # r b dθ
@@ -185,7 +185,7 @@ def integrate(wheel: Wheel, contact: Contact) -> Forces:
     drawbar_pull = _dot(tau, points.cosine) - resistance  # Eq. (8)
     load = _dot(tau, points.sine) + _dot(sigma, points.cosine)  # Eq. (9)
     torque = wheel.radius * np.sum(tau, axis=0)  # Eq. (10)
-    return Forces(drawbar_pull, load, torque, resistance)
+    return OriginalForces(drawbar_pull, load, torque, resistance)
 
 
 def forces(
@@ -199,7 +199,7 @@ def forces(
     mobilisation: Mobilisation = janosi,
     side_slip: Scalar = 0.0,
     order: int = ORDER,
-) -> Forces:
+) -> OriginalForces:
     """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the
     paper.
     """

@@ -20,7 +20,7 @@ from math import exp, sin
 from typing import Any
 
 from gritd.estimator.terramechanics import integrals, linear
-from gritd.estimator.terramechanics.linear import Prediction, Shift
+from gritd.estimator.terramechanics.linear import ClosedFormPrediction, Shift
 from gritd.estimator.terramechanics.soil import Wheel
 
 SMALLEST = 0.1  # of |s|: below it a derivative of H has lost four digits
@@ -42,7 +42,7 @@ def predict(
     slip: float,
     load: float,
     shift: Shift | None = None,
-) -> Prediction:
+) -> ClosedFormPrediction:
     """T, DP, resistance and σₘ under a load W, with gradients: arguments and result are those of
     `linear.predict`.
     """
@@ -111,7 +111,7 @@ def predict(
         )
         for q, by_w in enumerate((torque_s, pull_s, drag_s))
     ]
-    return Prediction(torque, pull, drag, s / theta_1, *gradients)
+    return ClosedFormPrediction(torque, pull, drag, s / theta_1, *gradients)
 
 
 def load(

@@ -18,13 +18,13 @@ from gritd.estimator.config.settings import Channel, Settings
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.wheel.windows import (
+    ChannelWindow,
     Counters,
     Mean,
     MeanWindow,
     Sample,
     Slope,
     SlopeWindow,
-    Window,
 )
 
 PROBE = NS  # [ns] length of the windows from which another is chosen (window_choice.py)
@@ -106,7 +106,7 @@ class Sync:
         """What each encoder read in the window."""
         return {name: list(window.inside) for name, window in self._slopes.items()}
 
-    def _windows(self) -> tuple[Window, ...]:
+    def _windows(self) -> tuple[ChannelWindow, ...]:
         return (*self._slopes.values(), *self._means.values(), *self._wrench.values())
 
     def _slope_window(self, channel: Channel) -> SlopeWindow:

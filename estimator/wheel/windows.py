@@ -51,7 +51,7 @@ class Mean(NamedTuple):
 
 
 @dataclass
-class Window:
+class ChannelWindow:
     """The readings of one channel, or of one axis of it, on both sides of the horizon.
 
     noise: standard deviation of one reading [raw]; latency [ns]; length of the window [ns].
@@ -119,7 +119,7 @@ class Window:
         return bool(self.inside) and self.closed - self.still_since >= span
 
 
-class MeanWindow(Window):
+class MeanWindow(ChannelWindow):
     """Mean of an analogue channel over the window.
 
     A sensor that stands still may dither between two values of its converter. It is told from a
@@ -145,7 +145,7 @@ class MeanWindow(Window):
 
 
 @dataclass
-class SlopeWindow(Window):
+class SlopeWindow(ChannelWindow):
     """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
 
     max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken

@@ -17,7 +17,7 @@ from gritd.estimator.messages.status import Status
 from gritd.estimator.offline.batch import Replayed, followed, replayed
 from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.offline.streams import streams_of
-from gritd.estimator.online.bed import Start
+from gritd.estimator.online.bed import RunStart
 from gritd.interface.runs import Place, Run, Table, configured
 
 Series = tuple[ArrayLike, ArrayLike]  # times [s] (n,) and raw values (n,), of the wrench (n, 6)
@@ -108,7 +108,7 @@ class Filter:
         >>> abs(estimates.tan_phi.value - 0.577) < 2 * estimates.tan_phi.sigma
         True
         """
-        start = Start(after.replayed.bank) if after is not None else None
+        start = RunStart(after.replayed.bank) if after is not None else None
 
         if isinstance(readings, Run):
             info = readings.info

@@ -22,7 +22,7 @@ from gritd.interface.runs import Place, Run, configured, read
 from gritd.tools.testbed import run_files
 from gritd.tools.testbed import schedule as schedules
 from gritd.tools.testbed.schedule import Schedule, Segment
-from gritd.tools.testbed.simulation import Run as Made
+from gritd.tools.testbed.simulation import SimulatedRun as Made
 from gritd.tools.testbed.simulation import simulate_run, soil_of
 
 SEGMENT = tuple(field.name for field in fields(Segment))

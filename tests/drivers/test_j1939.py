@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.drivers.can_signals import database
-from gritd.drivers.framing_can import EXTENDED, REMOTE, Accepted, CanFraming, pack
+from gritd.drivers.framing_can import EXTENDED, REMOTE, AcceptedIdentifiers, CanFraming, pack
 from tests.drivers.rig import FUZZ, can_device
 
 GROUP = 0xFEF1  # for all; 0xEF00 is for one
@@ -81,7 +81,7 @@ def test_a_link_lets_pass_what_its_framing_wants(can_id, remote):
         {"can_id": identifier(GROUP, 0x10), "can_mask": 0x3FFFF00, "extended": True},
         {"can_id": 0x100, "can_mask": (1 << 29) - 1, "extended": False},
     ]
-    accepted = Accepted(filters)
+    accepted = AcceptedIdentifiers(filters)
     group = (can_id & 0x3FFFF00) >> 8 == GROUP
     assert (can_id | EXTENDED in accepted) == group
     assert (can_id in accepted) == (can_id == 0x100)

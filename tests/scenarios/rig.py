@@ -32,7 +32,7 @@ from gritd.tools.commands import replay
 from gritd.tools.service.client import connected, reports
 from gritd.tools.testbed import rig_config
 from gritd.tools.testbed.testbed import experiment, in_transit, play
-from gritd.tools.testbed.wires import Rig, has_multicast, messages, slcan_line
+from gritd.tools.testbed.wires import ConnectedDevices, has_multicast, messages, slcan_line
 from tests.drivers.rig import Plug
 
 ROOT = Path(__file__).parents[2]
@@ -108,7 +108,7 @@ class PluggedBus:
         self.plug.close()
 
 
-class Wires(Rig):
+class Wires(ConnectedDevices):
     """The testbed's wires with the encoders on a plug, the configuration for a daemon on them, and
     a player.
     """

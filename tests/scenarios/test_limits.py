@@ -24,7 +24,7 @@ from gritd.estimator.recording.metadata import RECOVERED, RUN, sealed
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.commands import recover
 from gritd.tools.commands.check_config import summary
-from gritd.tools.dev.twenty.campaigns import SWEPT, Held, Run
+from gritd.tools.dev.twenty.campaigns import SWEPT, HeldInRun, PlannedRun
 from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
 from tests.estimator.recording.samples import pieces
 from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
@@ -81,7 +81,7 @@ def test_the_campaign_that_a_diagnosis_takes_longest_for(tmp_path, figure):
 def _driven(folder, load, acting):
     """A simulated run under a load [N] in which effects act."""
     schedule, run = folder / "schedule.yaml", folder / f"run-{load}.mcap"
-    schedule.write_text(Run(float(load), (*SWEPT, Held(0.2, seconds=20.0))).schedule)
+    schedule.write_text(PlannedRun(float(load), (*SWEPT, HeldInRun(0.2, seconds=20.0))).schedule)
     where = ("--schedule", schedule, "--seed", load, "-o", run)
     run.unlink(missing_ok=True)
     code, said = in_process("simulate", *CONFIG, *where, *acting)

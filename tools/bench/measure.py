@@ -41,7 +41,7 @@ from gritd.tools.bench.live import at_rate, live
 from gritd.tools.bench.start import start
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
-from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
+from gritd.tools.testbed.simulation import SimulatedRun, simulate_run, soil_of
 
 SEED = 2005
 RIM_SPEED = 0.02  # [m/s]
@@ -52,7 +52,7 @@ Figures = dict[str, float]
 
 
 @dataclass(frozen=True)
-class Sizes:
+class BenchSizes:
     """How much of everything; the defaults take about a minute."""
 
     seconds: float = 60.0  # of recording
@@ -69,16 +69,16 @@ class Sizes:
 
 
 # what takes minutes
-LONG = Sizes(fast=60.0, long=3600.0, runs=diagnosis.RUNS, lengths=diagnosis.LENGTHS)
+LONG = BenchSizes(fast=60.0, long=3600.0, runs=diagnosis.RUNS, lengths=diagnosis.LENGTHS)
 
 
 @dataclass(frozen=True)
 class Subject:
     """What is measured on."""
 
-    sizes: Sizes
+    sizes: BenchSizes
     configuration: config.Configuration
-    run: Run
+    run: SimulatedRun
     path: Path  # of its recording, raw topics only
     logged: Path  # the same run with what the ticks said
 
@@ -87,7 +87,7 @@ class Subject:
         return [_timed(run) for _ in range(self.sizes.repeats)]
 
 
-def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
+def measure(sizes: BenchSizes, folder: Path) -> dict[str, Figures]:
     """All figures by section, SI: times in s, speeds as multiples of real time."""
     sections: dict[str, Callable[[Subject], Figures]] = {
         "tick": tick,
@@ -123,7 +123,7 @@ def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
     return figures
 
 
-def _subject(sizes: Sizes, folder: Path) -> Subject:
+def _subject(sizes: BenchSizes, folder: Path) -> Subject:
     """The packaged testbed over three loads and five slips."""
     configuration = config.load(packaged())
     settings = configuration.settings
@@ -199,7 +199,7 @@ def replay(subject: Subject) -> Figures:
     } | {f"{kind}_best": seconds / min(times) for kind, times in spent.items()}
 
 
-def long_replay(sizes: Sizes, folder: Path) -> Figures:
+def long_replay(sizes: BenchSizes, folder: Path) -> Figures:
     """A long recording with ticks: what of its replay is reading and what is the filter's [s], and
     the whole as a multiple of real time.
     """

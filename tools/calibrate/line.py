@@ -31,7 +31,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Line:
+class CalibrationLine:
     """physical = raw · scale + offset.
 
     scale:     its sigma is that of the slope; offset: its sigma is that at physical zero.
@@ -53,7 +53,7 @@ class Line:
         return float(np.sqrt((self.residuals**2).sum() / freedom)) if freedom > 0 else 0.0
 
 
-def fitted(points: Sequence[Point]) -> Line:
+def fitted(points: Sequence[Point]) -> CalibrationLine:
     """The line raw = a + b · known by weighted least squares, turned round. Where the residuals are
     larger than expected, all σ are raised by as much. Raises CommandError.
     """
@@ -82,7 +82,7 @@ def fitted(points: Sequence[Point]) -> Line:
 
     warnings += dict.fromkeys(note for point in points for note in point.notes)
 
-    return Line(
+    return CalibrationLine(
         tuple(points),
         Uncertain(1.0 / slope, float(spread[1]) / slope**2),
         Uncertain(-zero / slope, float(spread[0]) / abs(slope)),

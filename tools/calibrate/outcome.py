@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 from gritd.estimator.config import units
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.calibrate.line import Line
+from gritd.tools.calibrate.line import CalibrationLine
 from gritd.tools.cli.yaml_edit import EditedYaml, plain_text, quantity
 
 BAR = 41  # characters of the picture of a residual
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class CalibratedKey:
     """One key: its path in the configuration, value ± σ in SI, the SI unit, and the unit that is
     shown.
     """
@@ -26,18 +26,18 @@ class Calibrated:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CalibrationOutcome:
     """Everything one calibration found.
 
     sensor: path of the mapping that gets date and serial number; none where no sensor was.
     lines:  what is told of the data, before the values.
     """
 
-    values: tuple[Calibrated, ...]
+    values: tuple[CalibratedKey, ...]
     sensor: tuple[str, ...] = ()
     lines: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    fits: tuple[tuple[str, Line], ...] = field(default=())
+    fits: tuple[tuple[str, CalibrationLine], ...] = field(default=())
 
     def text(self, before: EditedYaml) -> str:
         """For a person: data, values beside what the configuration had, warnings."""
@@ -55,7 +55,7 @@ class Outcome:
         return f"{'.'.join(path)}: {number}" if number else ""
 
 
-def written(outcome: Outcome, document: EditedYaml, date: str, serial: str) -> str:
+def written(outcome: CalibrationOutcome, document: EditedYaml, date: str, serial: str) -> str:
     """The text of the configuration with what was found."""
     for each in outcome.values:
         like = document.written(*each.path) or f"1 {each.shown}"
@@ -67,7 +67,7 @@ def written(outcome: Outcome, document: EditedYaml, date: str, serial: str) -> s
     return document.text()
 
 
-def _shown(each: Calibrated, before: EditedYaml) -> str:
+def _shown(each: CalibratedKey, before: EditedYaml) -> str:
     like = before.written(*each.path) or f"1 {each.shown}"
     text = quantity(each.value.value, each.value.sigma, each.unit, like)
     return text.removeprefix("{value: ").replace(", sigma: ", " ± ").removesuffix("}")
@@ -77,7 +77,7 @@ def _was(before: EditedYaml, path: Sequence[str]) -> str:
     return before.written(*path)
 
 
-def residual_table(line: Line, raw: str, unit: str) -> list[str]:
+def residual_table(line: CalibrationLine, raw: str, unit: str) -> list[str]:
     """The points of a line, one a row, with the residual as a bar about zero."""
     factor = float(units.unit(unit).factor)
     largest = max(abs(line.residuals).max(), line.expected.max()) or 1.0

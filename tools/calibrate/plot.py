@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gritd.tools.calibrate.line import Line
-from gritd.tools.calibrate.outcome import Outcome
+from gritd.tools.calibrate.line import CalibrationLine
+from gritd.tools.calibrate.outcome import CalibrationOutcome
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.cli.optional import require
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 HEIGHT = 3.2  # [in]
 
 
-def draw(path: Path, outcome: Outcome) -> None:
+def draw(path: Path, outcome: CalibrationOutcome) -> None:
     """As PNG or SVG. Raises CommandError."""
     require("matplotlib", "--png")
     if not outcome.fits:
@@ -41,7 +41,7 @@ def draw(path: Path, outcome: Outcome) -> None:
             raise CommandError(f"{path}: {why}", USAGE) from None
 
 
-def _line(axes: Axes, name: str, line: Line) -> None:
+def _line(axes: Axes, name: str, line: CalibrationLine) -> None:
     from gritd.tools.cli.drawing import AFTER, MEASURED, WIDE
 
     raw = np.array([point.raw.value for point in line.points])
@@ -54,7 +54,7 @@ def _line(axes: Axes, name: str, line: Line) -> None:
     axes.legend()
 
 
-def _residuals(axes: Axes, line: Line) -> None:
+def _residuals(axes: Axes, line: CalibrationLine) -> None:
     """With ± σ as they are expected to be."""
     from gritd.tools.cli.drawing import AFTER, MEASURED, WIDE
 

@@ -32,7 +32,7 @@ class Signal:
     unit: str  # raw
 
 
-class Source(Protocol):
+class CalibrationSource(Protocol):
     """Where readings come from."""
 
     def points(self, signal: Signal, known: Sequence[Uncertain]) -> list[Point]:

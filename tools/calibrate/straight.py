@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.calibrate.line import Line, fitted
-from gritd.tools.calibrate.outcome import Calibrated, Outcome, residual_table
-from gritd.tools.calibrate.sources import Signal, Source
+from gritd.tools.calibrate.line import CalibrationLine, fitted
+from gritd.tools.calibrate.outcome import CalibratedKey, CalibrationOutcome, residual_table
+from gritd.tools.calibrate.sources import CalibrationSource, Signal
 
 
 @dataclass(frozen=True)
@@ -29,20 +29,20 @@ class Straight:
     shown: str
     offset: bool = True
 
-    def outcome(self, source: Source, known: Sequence[Uncertain]) -> Outcome:
+    def outcome(self, source: CalibrationSource, known: Sequence[Uncertain]) -> CalibrationOutcome:
         """Raises CommandError."""
         return self.of_line(fitted(source.points(self.signal, known)))
 
-    def of_line(self, line: Line, factor: float = 1.0) -> Outcome:
+    def of_line(self, line: CalibrationLine, factor: float = 1.0) -> CalibrationOutcome:
         """What a line says. `factor` turns the known values into what the channel measures."""
         scale = Uncertain(line.scale.value * factor, line.scale.sigma * abs(factor))
         shown = f"{self.shown}/{self.signal.unit}" if self.scale else ""
 
-        values = [Calibrated((*self.path, "scale"), scale, self.scale, shown)]
+        values = [CalibratedKey((*self.path, "scale"), scale, self.scale, shown)]
         if self.offset:
-            values.append(Calibrated((*self.path, "offset"), line.offset, self.unit, self.shown))
+            values.append(CalibratedKey((*self.path, "offset"), line.offset, self.unit, self.shown))
 
-        return Outcome(
+        return CalibrationOutcome(
             tuple(values),
             self.path,
             tuple(residual_table(line, self.signal.unit, self.shown)),

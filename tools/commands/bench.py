@@ -17,7 +17,7 @@ import numpy as np
 from gritd.estimator.compiled import arithmetic
 from gritd.estimator.config.settings import ENGINES
 from gritd.tools.bench.compare import comparison, loaded, ratios
-from gritd.tools.bench.measure import LONG, Figures, Sizes, measure
+from gritd.tools.bench.measure import LONG, BenchSizes, Figures, measure
 from gritd.tools.cli.command import DONE, FAILED, Parser
 
 
@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
     arguments = build_parser().parse_args(argv)
     before = loaded(arguments.compare) if arguments.compare else {}
     with TemporaryDirectory(prefix="gritd-bench-") as folder:
-        figures = measure(LONG if arguments.long else Sizes(), Path(folder))
+        figures = measure(LONG if arguments.long else BenchSizes(), Path(folder))
 
     if arguments.json:
         print(json.dumps({"machine": machine(), **figures}, indent=2))

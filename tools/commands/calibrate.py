@@ -18,9 +18,15 @@ from gritd.estimator.config.yamltree import read_text
 from gritd.tools.calibrate import plot
 from gritd.tools.calibrate.capture import capture
 from gritd.tools.calibrate.live import Live
-from gritd.tools.calibrate.outcome import Outcome, written
+from gritd.tools.calibrate.outcome import CalibrationOutcome, written
 from gritd.tools.calibrate.procedures import datum, encoders, load, pot, press, shunt, soil, torque
-from gritd.tools.calibrate.sources import Recorded, Source, known_value, known_values, steps
+from gritd.tools.calibrate.sources import (
+    CalibrationSource,
+    Recorded,
+    known_value,
+    known_values,
+    steps,
+)
 from gritd.tools.calibrate.straight import Straight
 from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser, number, whole
@@ -35,7 +41,7 @@ TO_DO = {  # while the sensors are recorded
 }
 SET_VALUES = "set one value after the other, each for two seconds or more"
 READ = 3.0  # [s] at each value, unless --seconds says otherwise
-Procedure = Callable[[argparse.Namespace, Settings], Outcome]
+Procedure = Callable[[argparse.Namespace, Settings], CalibrationOutcome]
 
 
 def main(argv: Sequence[str]) -> int:
@@ -86,7 +92,7 @@ def _capture(arguments: argparse.Namespace, configuration: Configuration) -> Non
     )
 
 
-def _text(outcome: Outcome, document: EditedYaml, arguments: argparse.Namespace) -> str:
+def _text(outcome: CalibrationOutcome, document: EditedYaml, arguments: argparse.Namespace) -> str:
     """The configuration with what was found. Bekker's moduli take the place of Reece's."""
     if any(value.path == ("soil", "k_c") for value in outcome.values):
         for key in ("k1", "k2"):
@@ -98,7 +104,7 @@ def _text(outcome: Outcome, document: EditedYaml, arguments: argparse.Namespace)
 
 
 def _straight(procedure: Straight) -> Procedure:
-    def run(arguments: argparse.Namespace, settings: Settings) -> Outcome:
+    def run(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
         _check_wrench(procedure.signal.channel, settings)
         known, source = _known(arguments, settings, procedure.shown)
         return procedure.outcome(source, known)
@@ -106,7 +112,7 @@ def _straight(procedure: Straight) -> Procedure:
     return run
 
 
-def _encoders(arguments: argparse.Namespace, settings: Settings) -> Outcome:
+def _encoders(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
     """Turns of the wheel, or lengths of rail."""
     if (arguments.wheel is None) == (arguments.carriage is None):
         raise CommandError("encoders: expected --wheel TURNS or --carriage LENGTHS", USAGE)
@@ -118,7 +124,7 @@ def _encoders(arguments: argparse.Namespace, settings: Settings) -> Outcome:
     return encoders.outcome(encoders.CARRIAGE, source, known, settings.pulley_radius)
 
 
-def _datum(arguments: argparse.Namespace, settings: Settings) -> Outcome:
+def _datum(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
     """Touches told by the load in a recording, by the user live or as --step."""
     if arguments.recorded is None:
         live = _live(arguments, settings, "mm")
@@ -131,7 +137,7 @@ def _datum(arguments: argparse.Namespace, settings: Settings) -> Outcome:
     return datum.outcome(datum.touches(recorded, settings, arguments.touch_force), settings)
 
 
-def _torque(arguments: argparse.Namespace, settings: Settings) -> Outcome:
+def _torque(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
     """A lever where torques are known; else a recording of spinning, or with a torque sensor."""
     if arguments.known is not None or arguments.step:
         known, source = _known(arguments, settings, "N*m")
@@ -149,7 +155,7 @@ def _torque(arguments: argparse.Namespace, settings: Settings) -> Outcome:
     return torque.by_spinning(recorded, settings)
 
 
-def _soil(arguments: argparse.Namespace, settings: Settings) -> Outcome:
+def _soil(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
     tests = [_press(path, arguments, settings) for path in arguments.files]
     if not tests:
         raise CommandError("soil: expected FILES of plate tests, or --record", USAGE)
@@ -194,7 +200,7 @@ def _check_wrench(channel: str, settings: Settings) -> None:
 
 def _known(
     arguments: argparse.Namespace, settings: Settings, shown: str
-) -> tuple[list[Uncertain], Source]:
+) -> tuple[list[Uncertain], CalibrationSource]:
     """The known values, and where the readings beside them come from. Raises CommandError."""
     unit = _si(shown)
     sigma = known_value(arguments.known_sigma, unit) if arguments.known_sigma else 0.0

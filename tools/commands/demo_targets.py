@@ -34,7 +34,7 @@ NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimatedParameter:
     """One estimated soil parameter at the end of the run, SI."""
 
     name: str
@@ -65,7 +65,7 @@ class Estimate:
         return missed
 
 
-def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[Estimate]:
+def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[EstimatedParameter]:
     """The last tick against the truth. ticks: /tick (n,)."""
     full = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS >= FULL_RUN
     last = dict(zip(ticks.dtype.names or (), ticks[-1].tolist(), strict=True))
@@ -74,9 +74,9 @@ def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[Est
 
 def _estimates(
     last: Mapping[str, float], truth: Mapping[str, float], targets: Mapping[str, float]
-) -> list[Estimate]:
+) -> list[EstimatedParameter]:
     return [
-        Estimate(name, last[name], last[f"{name}_sigma"], truth[name], targets.get(name))
+        EstimatedParameter(name, last[name], last[f"{name}_sigma"], truth[name], targets.get(name))
         for name in SHOWN
     ]
 
@@ -106,12 +106,12 @@ def without_correction(recording: Recording, truth: Mapping[str, float]) -> list
     return [f"the same readings without {LINEARISATION}:", *table(estimates)[1:]]
 
 
-def reasons(estimates: Sequence[Estimate]) -> list[str]:
+def reasons(estimates: Sequence[EstimatedParameter]) -> list[str]:
     """Why the run falls short of its targets; empty if it does not."""
     return [reason for estimate in estimates for reason in estimate.shortcomings]
 
 
-def praise(estimates: Sequence[Estimate]) -> str:
+def praise(estimates: Sequence[EstimatedParameter]) -> str:
     """What is said where nothing fell short."""
     judged = any(estimate.allowed is not None for estimate in estimates)
     return (
@@ -119,7 +119,7 @@ def praise(estimates: Sequence[Estimate]) -> str:
     )
 
 
-def table(estimates: Sequence[Estimate]) -> list[str]:
+def table(estimates: Sequence[EstimatedParameter]) -> list[str]:
     """Estimate, truth, error and target, a line each."""
     lines = [f"{'':6}{'estimate ± σ':>22}{'truth':>12}{'error':>9}{'in σ':>8}   target"]
 
@@ -135,7 +135,7 @@ def table(estimates: Sequence[Estimate]) -> list[str]:
     return lines
 
 
-def _target(estimate: Estimate) -> str:
+def _target(estimate: EstimatedParameter) -> str:
     if estimate.allowed is None:
         return "none"
     return (
@@ -159,7 +159,7 @@ def _listed(times: Array, names: Sequence[str]) -> str:
     return ", ".join(f"{time:.3f} ms ({name})" for time, name in zip(times, names, strict=True))
 
 
-def headline(estimates: Sequence[Estimate], plant: PlantKind, ticks: Rows) -> str:
+def headline(estimates: Sequence[EstimatedParameter], plant: PlantKind, ticks: Rows) -> str:
     """The run in one line, for the figure. ticks: /tick (n,)."""
     seconds = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS
     errors = ", ".join(

@@ -207,7 +207,7 @@ def _many(arguments: argparse.Namespace) -> int:
     return FAILED if failed else DONE
 
 
-def _campaign(campaign: campaigns.Campaign) -> str:
+def _campaign(campaign: campaigns.CampaignFiles) -> str:
     """Verdict and summary of one campaign, or the one line of what was wrong with it."""
     try:
         with contextlib.redirect_stdout(io.StringIO()):

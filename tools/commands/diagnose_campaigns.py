@@ -22,7 +22,7 @@ RESULT, REPORT = "diagnosis.json", "diagnosis.html"
 
 
 @dataclass(frozen=True)
-class Campaign:
+class CampaignFiles:
     """Files of one campaign. On a cluster the workers must see them under the same path."""
 
     folder: Path
@@ -56,7 +56,7 @@ class Campaign:
         ]
 
 
-def find(folder: Path) -> list[Campaign]:
+def find(folder: Path) -> list[CampaignFiles]:
     """The campaigns of a folder, by name. Raises CommandError where there is none, or one without a
     configuration.
     """
@@ -77,18 +77,21 @@ def find(folder: Path) -> list[Campaign]:
     return campaigns
 
 
-def _campaign(folder: Path) -> Campaign:
+def _campaign(folder: Path) -> CampaignFiles:
     configurations = sorted(folder.glob("*.yaml"))
     if len(configurations) != 1:
         raise CommandError(
             f"{folder}: found {len(configurations)} files *.yaml; expected its configuration", USAGE
         )
-    return Campaign(folder, tuple(sorted(folder.glob("*.mcap"))), configurations[0])
+    return CampaignFiles(folder, tuple(sorted(folder.glob("*.mcap"))), configurations[0])
 
 
 def diagnosed(
-    campaigns: list[Campaign], work: Callable[[Campaign], str], jobs: int, scheduler: str | None
-) -> Iterator[tuple[Campaign, str]]:
+    campaigns: list[CampaignFiles],
+    work: Callable[[CampaignFiles], str],
+    jobs: int,
+    scheduler: str | None,
+) -> Iterator[tuple[CampaignFiles, str]]:
     """Each campaign that is not done, with what `work` said of it, as they come."""
     left = [campaign for campaign in campaigns if not campaign.done]
     with workers(jobs, scheduler) as (executor, _), Progress("campaigns", len(left)) as progress:

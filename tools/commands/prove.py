@@ -16,7 +16,7 @@ from gritd.tools.cli.workers import add_cluster, cluster_of, workers
 from gritd.tools.proof.blind import batch, page, score, tables, trial
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import STRATA
-from gritd.tools.proof.blind.verdicts import Row, row
+from gritd.tools.proof.blind.verdicts import CaseRow, row
 from gritd.tools.proof.online.draw import STRATA as ONLINE
 
 SCORE, PAGE, SEALS = "score.json", "score.html", "seals.txt"
@@ -73,7 +73,7 @@ def _some_of(option: str, text: str, known: tuple[str, ...]) -> tuple[str, ...]:
     return chosen
 
 
-def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path) -> None:
+def _run(specs: Sequence[trial.WorkerSpec], arguments: argparse.Namespace, seals: Path) -> None:
     left = sum(not spec.done for spec in specs)
     told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
     with (
@@ -82,7 +82,7 @@ def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path
         Progress("cases", left) as progress,
     ):
 
-        def sealed(spec: trial.Spec, digest: str) -> None:
+        def sealed(spec: trial.WorkerSpec, digest: str) -> None:
             if digest not in told:
                 published.write(f"{spec.name} {digest}\n")
                 published.flush()
@@ -97,7 +97,7 @@ def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path
         )
 
 
-def _tell(rows: Sequence[Row], begun: batch.Batch, output: Path) -> None:
+def _tell(rows: Sequence[CaseRow], begun: batch.Batch, output: Path) -> None:
     counted = score.score(rows)
     (output / SCORE).write_text(
         json.dumps(counted, indent=1, ensure_ascii=False, allow_nan=False), encoding="utf-8"

@@ -55,7 +55,7 @@ def main(argv: Sequence[str]) -> int:
     return DAMAGED if damage else DONE
 
 
-def _write(told: campaign.Campaign, arguments: Namespace, output: Path) -> None:
+def _write(told: campaign.ReportedCampaign, arguments: Namespace, output: Path) -> None:
     """Raises OSError; CommandError where there is nothing to draw."""
     if not arguments.figure:
         text = json.dumps(numbers(told), indent=1) if arguments.json else campaign.render(told)
@@ -68,7 +68,7 @@ def _write(told: campaign.Campaign, arguments: Namespace, output: Path) -> None:
         raise CommandError(f"{arguments.files[0]}: {error}; nothing is drawn", FAILED) from None
 
 
-def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign:
+def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.ReportedCampaign:
     """The runs on one bed, with what their filter says. Raises CommandError."""
     recordings = [files.recording(path) for path in arguments.files]
     configurations = configurations_of(recordings, arguments)
@@ -82,7 +82,7 @@ def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign
         raise CommandError(error, DAMAGED) from None
 
     made = lab.lab_runs(runs)
-    return campaign.Campaign(
+    return campaign.ReportedCampaign(
         given[0].testbed,
         made,
         {

@@ -17,7 +17,7 @@ from gritd.estimator import effects
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config import units
 from gritd.estimator.config.effects import quantities
-from gritd.estimator.config.kinds import Quantity
+from gritd.estimator.config.kinds import NumberWithUnit
 from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
@@ -33,15 +33,15 @@ from gritd.tools.cli.files import unwritten, vacant
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed import schedule as schedules
 from gritd.tools.testbed.run_files import write, write_truth
-from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
+from gritd.tools.testbed.simulation import SimulatedRun, simulate_run, soil_of
 
 SOIL_VALUES = {  # with the bounds that they have in a configuration
-    "cohesion": Quantity("Pa", low=0.0, high=1e6),
-    "tan_phi": Quantity("", above=0.0, high=5.0),
-    "phi": Quantity("rad", above=0.0, high=1.373),
-    "shear_modulus": Quantity("m", above=0.0, high=1.0),
-    "exponent": Quantity("", above=0.0, high=5.0),
-    "modulus_factor": Quantity("", above=0.0, high=100.0),
+    "cohesion": NumberWithUnit("Pa", low=0.0, high=1e6),
+    "tan_phi": NumberWithUnit("", above=0.0, high=5.0),
+    "phi": NumberWithUnit("rad", above=0.0, high=1.373),
+    "shear_modulus": NumberWithUnit("m", above=0.0, high=1.0),
+    "exponent": NumberWithUnit("", above=0.0, high=5.0),
+    "modulus_factor": NumberWithUnit("", above=0.0, high=100.0),
 }
 SIMULATED = 0.45  # share of the time that is over when the run is written, 81 s and 40 min alike
 MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.9 kB a sample
@@ -269,7 +269,7 @@ def _quantity(where: str, text: str, unit: str) -> float:
         ) from None
 
 
-def _summary(path: Path, acting: Sequence[Effect], run: Run) -> str:
+def _summary(path: Path, acting: Sequence[Effect], run: SimulatedRun) -> str:
     time = np.asarray(run.motion.time)
     bogged = int(run.response.overloaded.sum())
 

@@ -18,9 +18,9 @@ from gritd.tools.recordings.catalogue import runs_of
 from gritd.tools.service.client import add_socket
 
 if TYPE_CHECKING:
-    from gritd.tools.view.app import Hub
+    from gritd.tools.view.app import FrameHub
     from gritd.tools.view.foxglove import Relay
-    from gritd.tools.view.server import Place
+    from gritd.tools.view.server import ListenAddress
 
 NEEDS = ("starlette", "uvicorn")
 FOXGLOVE = 8765  # the port that Foxglove looks at
@@ -44,9 +44,9 @@ def main(argv: Sequence[str]) -> int:
 def _serve(arguments: Namespace) -> None:
     """Raises CommandError."""
     from gritd.tools.view.library import library
-    from gritd.tools.view.server import Place
+    from gritd.tools.view.server import ListenAddress
 
-    place = Place(arguments.host, arguments.port, tuple(arguments.name), _token(arguments))
+    place = ListenAddress(arguments.host, arguments.port, tuple(arguments.name), _token(arguments))
     if not place.loopback and not place.token:
         raise CommandError(
             f"--host {place.host}: found no --token-file; expected one, since others can reach this"
@@ -63,13 +63,13 @@ def _serve(arguments: Namespace) -> None:
     serve(arguments, place, library())
 
 
-def _live(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
+def _live(arguments: Namespace, place: ListenAddress, files: Mapping[str, Path]) -> None:
     """The running daemon."""
-    from gritd.tools.view.app import Hub, live
-    from gritd.tools.view.feed import Feed
+    from gritd.tools.view.app import FrameHub, live
+    from gritd.tools.view.feed import DaemonFeed
     from gritd.tools.view.server import listening, serve
 
-    hub, feed = Hub(), Feed(arguments.socket)
+    hub, feed = FrameHub(), DaemonFeed(arguments.socket)
     with (
         closing(listening(place, arguments.any_port)) as listener,
         _relaying(arguments.foxglove, place) as relay,
@@ -89,7 +89,7 @@ def _live(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None
 
 
 @contextmanager
-def _relaying(port: int | None, place: Place) -> Iterator[Relay | None]:
+def _relaying(port: int | None, place: ListenAddress) -> Iterator[Relay | None]:
     """Raises CommandError where the port is not free."""
     if port is None:
         yield None
@@ -100,17 +100,17 @@ def _relaying(port: int | None, place: Place) -> Iterator[Relay | None]:
         yield relay
 
 
-def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
+def _recorded(arguments: Namespace, place: ListenAddress, files: Mapping[str, Path]) -> None:
     """Recordings. Raises CommandError."""
     from gritd.tools.view.app import recorded
-    from gritd.tools.view.campaign import Campaign
+    from gritd.tools.view.campaign import ViewedCampaign
     from gritd.tools.view.recorded import Recordings
     from gritd.tools.view.server import listening, serve
 
     paths = _paths(arguments.files)
     with Progress("a first look", len(paths)) as progress:
         recordings = Recordings(paths, progress.advance)
-    campaign = Campaign(paths)
+    campaign = ViewedCampaign(paths)
     with closing(listening(place, arguments.any_port)) as listener:
 
         def begin() -> None:
@@ -132,11 +132,11 @@ def _paths(given: Sequence[Path]) -> list[Path]:
     return found
 
 
-def _announce(place: Place, listener: socket.socket) -> None:
+def _announce(place: ListenAddress, listener: socket.socket) -> None:
     print(f"view {place.address(listener.getsockname()[1])}", flush=True)
 
 
-def _push(loop: asyncio.AbstractEventLoop, hub: Hub, frame: bytes) -> None:
+def _push(loop: asyncio.AbstractEventLoop, hub: FrameHub, frame: bytes) -> None:
     """From the feed's thread, also while the server ends."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(hub.push, frame)

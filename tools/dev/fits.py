@@ -157,7 +157,7 @@ def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -
 
 
 @dataclass(frozen=True)
-class Case:
+class FitCase:
     """A campaign on disk, or one to be drawn from a seed."""
 
     folder: Path | None
@@ -172,7 +172,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FitOutcome:
     """All fits of a campaign; failed: why it could not be diagnosed."""
 
     name: str
@@ -195,7 +195,7 @@ def _is_pair(folder: Path) -> bool:
     return all(any((folder / part).glob("*.mcap")) for part in (NEW, REFERENCE))
 
 
-def run_case(case: Case) -> Outcome:
+def run_case(case: FitCase) -> FitOutcome:
     """One campaign; one that cannot be diagnosed compares nothing."""
     rng = np.random.default_rng(case.seed)
     name = "/".join(Path(case.name).parts[-4:]) if case.folder else case.name
@@ -207,9 +207,9 @@ def run_case(case: Case) -> Outcome:
             noise = np.random.default_rng(0)
             rig, _ = accustomed(rig)
             search = search_models(prepare_screening(fit_base(rig, noise), noise))
-            return Outcome(case.name, tuple(compared(name, search, case.starts, rng)))
+            return FitOutcome(case.name, tuple(compared(name, search, case.starts, rng)))
         except CommandError as error:
-            return Outcome(case.name, (), str(error))
+            return FitOutcome(case.name, (), str(error))
 
 
 def _recorded(folder: Path) -> Rig:
@@ -234,7 +234,7 @@ def _drawn(rng: np.random.Generator) -> Rig:
 # ---- the page ----------------------------------------------------------------------------------
 
 
-def page(outcomes: Sequence[Outcome], asked: int) -> str:
+def page(outcomes: Sequence[FitOutcome], asked: int) -> str:
     """The result in Markdown."""
     rows = [row for outcome in outcomes for row in outcome.rows]
     off = [r for r in rows if _off(r) > LIMIT]
@@ -270,15 +270,15 @@ def _off(row: Compared) -> float:
     return max(abs(row.gain), row.gain_elsewhere)
 
 
-def kept(file: Path) -> list[Outcome]:
+def kept(file: Path) -> list[FitOutcome]:
     """What a file of JSON lines holds."""
     lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
     return [_outcome(json.loads(line)) for line in lines]
 
 
-def _outcome(line: dict[str, Any]) -> Outcome:
+def _outcome(line: dict[str, Any]) -> FitOutcome:
     rows = (Compared(**{**row, "names": tuple(row["names"])}) for row in line["rows"])
-    return Outcome(line["name"], tuple(rows), line["failed"])
+    return FitOutcome(line["name"], tuple(rows), line["failed"])
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -308,17 +308,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _cases(arguments: argparse.Namespace) -> list[Case]:
+def _cases(arguments: argparse.Namespace) -> list[FitCase]:
     """All that is asked for, in an order drawn by the seed."""
     seed, starts = arguments.seed, arguments.starts
-    cases = [Case(folder, seed, starts) for folder in campaigns(arguments.campaigns)]
-    cases += [Case(None, seed + 1 + k, starts) for k in range(arguments.drawn)]
+    cases = [FitCase(folder, seed, starts) for folder in campaigns(arguments.campaigns)]
+    cases += [FitCase(None, seed + 1 + k, starts) for k in range(arguments.drawn)]
     if not cases:
         raise CommandError("nothing to compare: name campaigns, or --drawn N")
     return [cases[k] for k in np.random.default_rng(seed).permutation(len(cases))]
 
 
-def _keep(file: Path | None, outcome: Outcome) -> None:
+def _keep(file: Path | None, outcome: FitOutcome) -> None:
     if file:
         with file.open("a", encoding="utf-8") as lines:
             lines.write(json.dumps(asdict(outcome)) + "\n")

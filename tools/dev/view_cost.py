@@ -60,7 +60,7 @@ KINDS = (
 )
 
 
-class Stretch(NamedTuple):
+class CostSpan(NamedTuple):
     """What went on from `begin` to `end` [ns]; processor time [s] of both, memory of the view
     [bytes].
     """
@@ -121,10 +121,10 @@ def on_wires(folder: Path, arguments: Namespace, stop: StopRequest) -> dict[str,
 
 def _stretches(
     folder: Path, daemon: Child, arguments: Namespace, stop: StopRequest
-) -> Iterator[Stretch]:
+) -> Iterator[CostSpan]:
     browsers, clients = arguments.browsers, arguments.clients
 
-    def during(name: str, view: Child | None, *doing: Callable[[], Awaitable[None]]) -> Stretch:
+    def during(name: str, view: Child | None, *doing: Callable[[], Awaitable[None]]) -> CostSpan:
         return asyncio.run(_during(name, daemon, view, arguments.seconds, doing))
 
     yield during("no view", None)
@@ -188,7 +188,7 @@ async def _during(
     view: Child | None,
     seconds: float,
     doing: Sequence[Callable[[], Awaitable[None]]],
-) -> Stretch:
+) -> CostSpan:
     tasks = [asyncio.ensure_future(each()) for each in doing]
     await asyncio.sleep(SETTLED)
     begin, before = time.time_ns(), [_used(child.pid) for child in (daemon, view) if child]
@@ -203,7 +203,7 @@ async def _during(
 
     used = [a - b for a, b in zip(after, before, strict=True)]
     memory = _memory(view.pid) if view else None
-    return Stretch(name, begin, end, used[0], used[1] if view else None, memory)
+    return CostSpan(name, begin, end, used[0], used[1] if view else None, memory)
 
 
 async def _followed(port: int) -> None:
@@ -242,7 +242,7 @@ def _memory(pid: int) -> float:
     return int(pages) * float(os.sysconf("SC_PAGESIZE"))
 
 
-def _tell(stretches: Sequence[Stretch], recording: Recording) -> None:
+def _tell(stretches: Sequence[CostSpan], recording: Recording) -> None:
     loop = recording.arrays("/loop")
     print(f"load average {os.getloadavg()[1]:.1f} on {os.cpu_count()} cores; {recording.path.name}")
     lost = loop[["dropped", "log_dropped"]][-1].tolist()

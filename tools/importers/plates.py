@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gritd.estimator.config.kinds import Choice, Quantity
+from gritd.estimator.config.kinds import Choice, NumberWithUnit
 from gritd.estimator.config.schema import (
     ABSENT,
     Impossible,
@@ -33,7 +33,7 @@ MEASURED = {
     "pressure": ("Pa", "pressure under the plate, in the place of the force"),
     "sinkage": ("m", "depth of the plate, positive downward"),
 }
-DIAMETER = Quantity("m", above=0, high=2)
+DIAMETER = NumberWithUnit("m", above=0, high=2)
 
 
 @dataclass(frozen=True)

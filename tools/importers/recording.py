@@ -28,7 +28,7 @@ UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measur
 
 
 @dataclass(frozen=True)
-class Stream:
+class ChannelReadings:
     """The readings of one channel: stamps [ns since the epoch] that rise, shape (n,); raw values,
     shape (n,), wrench (n, 6).
     """
@@ -75,7 +75,7 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
 
 def write(
     path: Path,
-    streams: Sequence[Stream],
+    streams: Sequence[ChannelReadings],
     configured: config.Configuration,
     run: RunInfo,
     progress: Progress | None = None,
@@ -99,7 +99,7 @@ def write(
     return path
 
 
-def _blocks(streams: Sequence[Stream]) -> Iterator[list[Stream]]:
+def _blocks(streams: Sequence[ChannelReadings]) -> Iterator[list[ChannelReadings]]:
     """The readings of the streams, each by rising stamps, in times of STEP readings or fewer."""
     if not streams:
         return
@@ -109,7 +109,7 @@ def _blocks(streams: Sequence[Stream]) -> Iterator[list[Stream]]:
     for edge in edges.tolist():
         ends = [int(np.searchsorted(stream.stamps, edge)) for stream in streams]
         yield [
-            Stream(stream.channel, stream.stamps[begin:end], stream.values[begin:end])
+            ChannelReadings(stream.channel, stream.stamps[begin:end], stream.values[begin:end])
             for stream, begin, end in zip(streams, begins, ends, strict=True)
             if end > begin
         ]

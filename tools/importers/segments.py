@@ -21,7 +21,7 @@ from scipy.stats import norm
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.limits import limits, raised
 from gritd.tools.importers.files import Array, RigFileError
-from gritd.tools.importers.recording import NS, Stream, stamps
+from gritd.tools.importers.recording import NS, ChannelReadings, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]
@@ -70,7 +70,9 @@ def scatter_of_mean(value: float, sigma: float) -> Uncertain:
     return Uncertain(value, sigma * INDEPENDENT**0.5)
 
 
-def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> list[Stream]:
+def streams(
+    conditions: Sequence[Condition], counting: Counting, *run: int
+) -> list[ChannelReadings]:
     """The segments one after the other, as the channels of a recording. Scatter has another order
     in every run.
     """
@@ -82,24 +84,28 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
 
     sinkage = _all([c.sinkage for c in conditions], *run, 3)
     sensors = [
-        Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
-        Stream(
+        ChannelReadings(
+            "wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)
+        ),
+        ChannelReadings(
             "carriage_encoder",
             times,
             _travel([c.carriage_speed for c in conditions], counting.carriage),
         ),
-        Stream("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
+        ChannelReadings("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
 
     if any(c.current is not None for c in conditions):
-        sensors.append(Stream("motor_shunt", times, _all([c.current for c in conditions], *run, 4)))
+        sensors.append(
+            ChannelReadings("motor_shunt", times, _all([c.current for c in conditions], *run, 4))
+        )
 
     axes = np.zeros((len(times), 6))
     axes[:, 0] = _all([c.drawbar_pull for c in conditions], *run, 0)
     axes[:, 1] = _all([c.lateral_force for c in conditions], *run, 1)
     axes[:, 2] = _all([c.load for c in conditions], *run, 2)
 
-    return [*sensors, Stream("wrench", times, axes)]
+    return [*sensors, ChannelReadings("wrench", times, axes)]
 
 
 def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:

@@ -67,7 +67,7 @@ def table_3() -> Lines:
 
     angles, slips = np.radians(np.linspace(10, 60, 51)), np.linspace(0.05, 0.8, 16)
     theta_1, slip = (grid.ravel() for grid in np.meshgrid(angles, slips))
-    rows: list[Row] = []
+    rows: list[ComparisonRow] = []
     for named in (*TABLE_1, LOOSE_SAND, MARS_LIKE):
         rows += compare(named.name, named.under(WHEEL.width), theta_1, slip)
 
@@ -116,7 +116,7 @@ def draw(count: int, seed: int) -> tuple[Soil, Array, Array, Array]:
     return soil, value["slip"], np.radians(value["theta_1"]), value["load"]
 
 
-class Row(NamedTuple):
+class ComparisonRow(NamedTuple):
     """One way of comparing: what, where σₘ is from, and (DP, T) in percent by each definition."""
 
     label: str
@@ -124,7 +124,7 @@ class Row(NamedTuple):
     percent: dict[str, tuple[float, float]]
 
 
-def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[Row]:
+def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[ComparisonRow]:
     """Closed forms with σₘ from W by (21), and with σₘ of (3) at θₘ, against the original's DP and
     T. θ₁ [rad] and slip (n,).
     """
@@ -136,10 +136,14 @@ def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[Row]:
         "of (21)": linear.forces_under_load(WHEEL, *state, exact.load, linear.ARRAYS),
         "of (3)": linear.forces(WHEEL, *state, peak, linear.ARRAYS),
     }
-    return [Row(label, source, deviations(forces, exact)) for source, forces in closed.items()]
+    return [
+        ComparisonRow(label, source, deviations(forces, exact)) for source, forces in closed.items()
+    ]
 
 
-def deviations(closed: linear.Forces, exact: original.Forces) -> dict[str, tuple[float, float]]:
+def deviations(
+    closed: linear.LinearForces, exact: original.OriginalForces
+) -> dict[str, tuple[float, float]]:
     """(DP, T) in percent, by each definition."""
     return {
         name: (define(closed.drawbar_pull, exact.drawbar_pull), define(closed.torque, exact.torque))
@@ -147,7 +151,7 @@ def deviations(closed: linear.Forces, exact: original.Forces) -> dict[str, tuple
     }
 
 
-def nearest(rows: list[Row], drawbar_pull: float, torque: float) -> str:
+def nearest(rows: list[ComparisonRow], drawbar_pull: float, torque: float) -> str:
     """The pair that comes closest to the printed one."""
 
     def distance(pair: tuple[float, float]) -> float:
@@ -164,7 +168,7 @@ def nearest(rows: list[Row], drawbar_pull: float, torque: float) -> str:
     )
 
 
-def _row(row: Row) -> str:
+def _row(row: ComparisonRow) -> str:
     cells = "".join(f"{pull:>8.2f}{torque:>8.2f}" for pull, torque in row.percent.values())
     return f"  {row.label:<14}{row.source:<9}{cells}"
 

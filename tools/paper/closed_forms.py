@@ -59,7 +59,7 @@ def closed_form_differences(seed: int) -> dict[str, Array]:
 
 def triangular_contact(
     theta_1: Array, slip: Array, f: Array, sigma_m: Array, c: Array, tan_phi: Array
-) -> original.Contact:
+) -> original.ContactStresses:
     """The stresses [Pa] of the linear model at quadrature nodes: triangular σ, and τ with the
     exponent f(θ₁ − θ). All arguments (n,): angles [rad], σₘ and c [Pa].
     """

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from gritd.estimator.config.units import UnitError, parse, split
-from gritd.estimator.config.yamltree import ConfigError, Node, Scalar, Sequence, compose
+from gritd.estimator.config.yamltree import ConfigError, Node, Scalar, YamlSequence, compose
 from gritd.estimator.config.yamltree import Mapping as YamlMapping
 from gritd.estimator.recording.recording import Recording
 
@@ -72,7 +72,7 @@ def _flat(node: Node, key: str) -> Iterator[tuple[str, str]]:
 def _text(node: Node) -> str:
     if isinstance(node, Scalar):
         return node.text
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return f"[{', '.join(map(_text, node.items))}]"
     return "{…}"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.recording.cdr import Field
-from gritd.estimator.recording.decoding import Source
+from gritd.estimator.recording.decoding import RecordedChannel
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.optional import missing
 from gritd.tools.messages.decoders import Undecodable, decoder
@@ -68,7 +68,7 @@ def _messages(recordings: Sequence[Recording], name: str) -> Iterator[tuple[int,
                     raise Undecodable(" ".join(str(error).split())[:120]) from None
 
 
-def _decoder(source: Source) -> Any:
+def _decoder(source: RecordedChannel) -> Any:
     schema, channel = source.schema, source.channel
     if channel.message_encoding not in ("json", "protobuf") and (how := missing("rosbags")):
         raise Undecodable(how)

@@ -17,7 +17,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.wording import honesty, listed, number, percent, spaced
 from gritd.tools.report import figures, lab, masthead, plot, redo
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
-from gritd.tools.report.lab import Beside, LabRun, joined
+from gritd.tools.report.lab import LabRun, MeasuredWindows, joined
 from gritd.tools.report.words import counted, held, name_of, sentence, stopped, uncertain
 
 FORCES = {"torque": ("T [N·m]", "N·m"), "drawbar_pull": ("DP [N]", "N")}  # label, unit
@@ -36,7 +36,7 @@ LATE = 5.0  # usual distances of two messages: what is farther is a gap
 
 
 @dataclass(frozen=True)
-class Campaign:
+class ReportedCampaign:
     """What is told of a campaign."""
 
     testbed: str
@@ -50,7 +50,7 @@ class Campaign:
         return self.runs[-1].run.known.estimate
 
 
-def render(campaign: Campaign) -> str:
+def render(campaign: ReportedCampaign) -> str:
     """The whole document."""
     return page(
         f"gritd report: {campaign.testbed}",
@@ -69,7 +69,7 @@ def render(campaign: Campaign) -> str:
 # --- the first page ---
 
 
-def _title(campaign: Campaign) -> Markup:
+def _title(campaign: ReportedCampaign) -> Markup:
     count = counted(len(campaign.runs), "run")
     return tag(
         "header",
@@ -81,7 +81,7 @@ def _title(campaign: Campaign) -> Markup:
     )
 
 
-def _summary(campaign: Campaign) -> str:
+def _summary(campaign: ReportedCampaign) -> str:
     """Soil, and how far both forms of the equations are off."""
     x, P = campaign.estimate.x, campaign.estimate.soil_P
     c, tan_phi = (x[i] for i in (C, TAN_PHI))
@@ -94,7 +94,7 @@ def _summary(campaign: Campaign) -> str:
     return f"{soil} {_differences(campaign)}".strip()
 
 
-def _differences(campaign: Campaign) -> str:
+def _differences(campaign: ReportedCampaign) -> str:
     """Of both forms from what was measured, over the windows of all runs."""
     every = [run.beside for run in campaign.runs if run.beside is not None]
     if not every:
@@ -113,7 +113,7 @@ def _differences(campaign: Campaign) -> str:
 # --- forces ---
 
 
-def _forces(campaign: Campaign) -> Markup | None:
+def _forces(campaign: ReportedCampaign) -> Markup | None:
     of = [run for run in campaign.runs if run.beside is not None]
     if not of:
         return None
@@ -164,7 +164,7 @@ def _in_view(drawn: Sequence[tuple[float, Markup]]) -> Iterator[Markup]:
         yield tag("details", summary, folded, class_="unprinted")
 
 
-def _errors(part: Beside, channel: str, unit: str) -> str:
+def _errors(part: MeasuredWindows, channel: str, unit: str) -> str:
     """How far both forms are off."""
     off = (f"{which} {number(part.off(channel, which), 2)}" for which in ("original", "closed"))
     return f"{', '.join(off)} {unit}"
@@ -178,7 +178,7 @@ def _effects(of: Sequence[LabRun]) -> str:
     return f"the configured {listed(names)}" if names else "no effects"
 
 
-def _over_slip(of: Beside, channel: str, label: str) -> Markup:
+def _over_slip(of: MeasuredWindows, channel: str, label: str) -> Markup:
     """Recorded windows as dots, both forms as curves of their means over slip."""
     slip, measured = of.slip * 100.0, of.measured[channel]
     computed = {"before": of.original[channel], "after": of.closed[channel]}
@@ -206,7 +206,7 @@ def mean_over(x: Array, y: Array) -> tuple[Array, Array]:
 # --- estimates ---
 
 
-def _estimates(campaign: Campaign) -> Markup:
+def _estimates(campaign: ReportedCampaign) -> Markup:
     note = (
         "Each run begins with what the runs before it know. The band is ± 2σ."
         if len(campaign.runs) > 1
@@ -224,7 +224,7 @@ def _estimates(campaign: Campaign) -> Markup:
     )
 
 
-def _over_time(campaign: Campaign, name: str, label: str, factor: float) -> Markup:
+def _over_time(campaign: ReportedCampaign, name: str, label: str, factor: float) -> Markup:
     """Value and band over the driven time of all runs."""
     value = np.concatenate([run.rows[name] for run in campaign.runs]) * factor
     sigma = np.concatenate([run.rows[f"{name}_sigma"] for run in campaign.runs]) * factor
@@ -242,7 +242,7 @@ def _over_time(campaign: Campaign, name: str, label: str, factor: float) -> Mark
     )
 
 
-def _time(campaign: Campaign) -> tuple[Array, list[float]]:
+def _time(campaign: ReportedCampaign) -> tuple[Array, list[float]]:
     """Time [s] of every window, the runs one after the other, and where each begins."""
     pieces, begins, passed = [], [], 0.0
     for run in campaign.runs:
@@ -254,7 +254,7 @@ def _time(campaign: Campaign) -> tuple[Array, list[float]]:
     return np.concatenate(pieces), begins
 
 
-def _ellipses(campaign: Campaign) -> Markup:
+def _ellipses(campaign: ReportedCampaign) -> Markup:
     """2σ ellipses of c and tan φ: some of each run, and the last."""
     chosen = [
         _outline(row)
@@ -308,7 +308,7 @@ def _outline(row: np.void) -> tuple[Array, Array]:
 # --- sensors ---
 
 
-def _sensors(campaign: Campaign) -> Markup:
+def _sensors(campaign: ReportedCampaign) -> Markup:
     """Rate, gaps and longest silence of every channel, over all runs; what the filter said."""
     lines = [
         tag(
@@ -360,7 +360,7 @@ def _lateness(run: LabRun) -> str:
     return f", ticks late by {late[0]:.2f} ms (99 %), {late[1]:.2f} ms (max)"
 
 
-def _notes(campaign: Campaign) -> Child:
+def _notes(campaign: ReportedCampaign) -> Child:
     if not campaign.notes:
         return None
     return section("Notes", tag("ul", (tag("li", stopped(note)) for note in campaign.notes)))

@@ -26,7 +26,7 @@ SCATTERED = 1500  # dots a panel
 TURN = 2.0 * np.pi
 
 
-class Rows(NamedTuple):
+class PanelHeights(NamedTuple):
     """Heights [px] of a trace panel: the signal, the residual under it, the whole."""
 
     signal: tuple[float, float] = (20.0, 128.0)
@@ -34,7 +34,7 @@ class Rows(NamedTuple):
     height: float = 244.0
 
 
-ROWS = Rows()
+ROWS = PanelHeights()
 
 
 def figure(

@@ -13,8 +13,8 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from gritd.tools.cli.drawing import AFTER, COLUMN, FINE, LINE, SOFT, Name, last, look, named, save
-from gritd.tools.report.campaign import FORCES, Campaign, mean_over
-from gritd.tools.report.lab import Beside, joined
+from gritd.tools.report.campaign import FORCES, ReportedCampaign, mean_over
+from gritd.tools.report.lab import MeasuredWindows, joined
 
 HEIGHT = 2.3  # [in] of a force
 PALEST = 0.55  # share of white in the colour of the lightest load
@@ -22,7 +22,7 @@ MOST = 300  # dots of a load
 KEY = "dots: measured, lines: original equations, dashed: closed form"
 
 
-def draw(path: Path, campaign: Campaign) -> None:
+def draw(path: Path, campaign: ReportedCampaign) -> None:
     """As PNG or SVG. Raises OSError, and ValueError where the filter was never updated."""
     every = [run.beside for run in campaign.runs if run.beside is not None]
     if not every:
@@ -42,11 +42,11 @@ def draw(path: Path, campaign: Campaign) -> None:
         save(figure, path)
 
 
-def _measured(loads: Sequence[Beside], channel: str) -> bool:
+def _measured(loads: Sequence[MeasuredWindows], channel: str) -> bool:
     return any(np.isfinite(load.measured[channel]).any() for load in loads)
 
 
-def _force(ax: Axes, loads: Sequence[Beside], channel: str) -> None:
+def _force(ax: Axes, loads: Sequence[MeasuredWindows], channel: str) -> None:
     """Each load in a shade of its own, the heaviest the darkest."""
     names = []
     for at, load in enumerate(loads):

@@ -25,7 +25,7 @@ from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.stages.situation import Motion, Reaction
 from gritd.estimator.terramechanics import linear
-from gritd.estimator.terramechanics.original import Forces
+from gritd.estimator.terramechanics.original import OriginalForces
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.cli.wording import NOTHING, fixed
 from gritd.tools.diagnose.explain.result import Diagnosis
@@ -42,7 +42,7 @@ CHANNELS = ("torque", "drawbar_pull")
 
 
 @dataclass(frozen=True)
-class Beside:
+class MeasuredWindows:
     """Measured beside the equations at the windows (n,) at which the filter was updated."""
 
     slip: Array
@@ -62,13 +62,13 @@ class Beside:
         """Root mean square σ of what was measured [the channel's unit]."""
         return _rms(self.sigma[channel])
 
-    def at(self, index: NDArray[np.intp]) -> Beside:
+    def at(self, index: NDArray[np.intp]) -> MeasuredWindows:
         """Some of the windows (n,)."""
         forces = (self.measured, self.sigma, self.original, self.closed)
         chosen = ({name: values[index] for name, values in each.items()} for each in forces)
-        return Beside(self.slip[index], self.load[index], *chosen)
+        return MeasuredWindows(self.slip[index], self.load[index], *chosen)
 
-    def by_load(self) -> list[Beside]:
+    def by_load(self) -> list[MeasuredWindows]:
         """The windows of each load that was driven, the lightest first; what lies between two
         loads for a few windows alone is a change of load, and left out.
         """
@@ -79,7 +79,7 @@ class Beside:
         return [self.at(np.sort(group)) for group in kept]
 
 
-def joined(parts: Sequence[Beside]) -> Beside:
+def joined(parts: Sequence[MeasuredWindows]) -> MeasuredWindows:
     """The windows of several, one after the other."""
     slip, load = (np.concatenate([getattr(p, name) for p in parts]) for name in ("slip", "load"))
     of = ("measured", "sigma", "original", "closed")
@@ -87,7 +87,7 @@ def joined(parts: Sequence[Beside]) -> Beside:
         {c: np.concatenate([getattr(part, name)[c] for part in parts]) for c in CHANNELS}
         for name in of
     )
-    return Beside(slip, load, *forces)
+    return MeasuredWindows(slip, load, *forces)
 
 
 def _rms(values: Array) -> float:
@@ -103,7 +103,7 @@ class LabRun:
     run: BedRun
     summary: RunSummary
     sha256: str
-    beside: Beside | None  # None where the filter was never updated
+    beside: MeasuredWindows | None  # None where the filter was never updated
 
     @property
     def name(self) -> str:
@@ -133,7 +133,7 @@ def sha256(recording: Recording) -> str:
     return digest.hexdigest()
 
 
-def beside(run: BedRun, estimate: Estimate) -> Beside | None:
+def beside(run: BedRun, estimate: Estimate) -> MeasuredWindows | None:
     """Both forms of the equations at the windows of a run, at an estimate of the soil, with the
     effects and the discrepancy of the configuration: what `gritd diagnose` simulates, at the
     measured entry angle. None where the filter was never updated.
@@ -147,7 +147,7 @@ def beside(run: BedRun, estimate: Estimate) -> Beside | None:
         return None
 
     original, closed = _both_forms(run.settings, estimate, rows)
-    return Beside(
+    return MeasuredWindows(
         np.asarray(rows["slip"]),
         np.asarray(rows["load"]),
         {name: np.asarray(rows[name]) for name in CHANNELS},
@@ -183,7 +183,7 @@ def _motion(settings: Settings, rows: Rows) -> Motion:
     )
 
 
-def _closed(solved: Carried) -> Forces:
+def _closed(solved: Carried) -> OriginalForces:
     """Forces (n,) of Eqs. (20)-(22) with σₘ from (21), at the soil and the motion under the wheel,
     without what contact effects change of the stresses' shape.
     """
@@ -195,7 +195,7 @@ def _closed(solved: Carried) -> Forces:
     by = linear.forces_under_load(
         solved.wheel, c, tan_phi, k, theta_1, slip, load, maths=linear.ARRAYS
     )
-    return Forces(*(np.asarray(getattr(by, name)) for name in Forces._fields))
+    return OriginalForces(*(np.asarray(getattr(by, name)) for name in OriginalForces._fields))
 
 
 # --- the table of runs ---
@@ -229,7 +229,7 @@ def _date(stamp: int) -> str:
     return time.strftime("%Y-%m-%d %H:%M", time.gmtime(stamp * NS)) if stamp > UNDATED else NOTHING
 
 
-def _slips(of: Beside | None) -> str:
+def _slips(of: MeasuredWindows | None) -> str:
     if of is None:
         return NOTHING
     low, high = np.quantile(of.slip, (0.02, 0.98)) * 100.0

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from gritd.estimator.filter.estimate import KPA, TAN_PHI, C, Estimate
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.report.campaign import FORCES, Campaign, mean_over
-from gritd.tools.report.lab import Beside, LabRun
+from gritd.tools.report.campaign import FORCES, ReportedCampaign, mean_over
+from gritd.tools.report.lab import LabRun, MeasuredWindows
 
 MOST = 400  # windows of a load
 
 
-def numbers(campaign: Campaign) -> dict[str, Any]:
+def numbers(campaign: ReportedCampaign) -> dict[str, Any]:
     """SI units; what is not known is None."""
     return {
         "testbed": campaign.testbed,
@@ -47,7 +47,7 @@ def _soil(estimate: Estimate) -> dict[str, dict[str, float]]:
     }
 
 
-def _load(part: Beside) -> dict[str, Any]:
+def _load(part: MeasuredWindows) -> dict[str, Any]:
     """The windows of a load in the order of slip, and both forms' means over it."""
     order = np.argsort(part.slip)
     some = order[:: max(1, -(-len(order) // MOST))]
@@ -58,7 +58,7 @@ def _load(part: Beside) -> dict[str, Any]:
     }
 
 
-def _force(part: Beside, name: str, some: NDArray[np.intp]) -> dict[str, Any]:
+def _force(part: MeasuredWindows, name: str, some: NDArray[np.intp]) -> dict[str, Any]:
     off = {which: part.off(name, which) for which in ("original", "closed")}
     forms = {
         which: dict(zip(("slip", "value"), map(_list, mean_over(part.slip, values)), strict=True))

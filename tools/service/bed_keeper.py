@@ -14,7 +14,7 @@ from gritd.estimator.daemon.clock import NS, wall_ns
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.filter.reasons import withheld
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.online.bed import Start, fingerprint
+from gritd.estimator.online.bed import RunStart, fingerprint
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class BedOfRun:
     trouble: str = ""  # why the bed that was there is not used: one line
 
     @property
-    def start(self) -> Start | None:
+    def start(self) -> RunStart | None:
         """What the run begins with; None for the stated prior."""
         return bed_file.start_of(self.bed, self.settings, self.began)
 

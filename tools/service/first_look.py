@@ -12,8 +12,8 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.daemon.notice import Notice
 from gritd.estimator.messages.tick import TICK_NAMES
-from gritd.estimator.plausibility.clock import Clock
-from gritd.estimator.plausibility.driven import MOVES, Course, Driven, with_driving
+from gritd.estimator.plausibility.clock import ReadingTimes
+from gritd.estimator.plausibility.driven import MOVES, DrivenRun, RunWindows, with_driving
 from gritd.estimator.plausibility.words import warnings
 
 LOOKS = 100  # ten a second, while the wheel drives
@@ -49,13 +49,13 @@ class FirstLook:
                 yield Notice(line)
 
 
-def _driven(seen: list[tuple[float, ...]], settings: Settings) -> Driven:
+def _driven(seen: list[tuple[float, ...]], settings: Settings) -> DrivenRun:
     speed, travel, sinkage, load, torque, pull, noise = np.array(seen).T
     radius = settings.wheel.radius
-    course = Course(
+    course = RunWindows(
         radius * speed, travel, sinkage, load, torque, pull, np.zeros(speed.size, dtype=bool)
     )
     window = 1.0 / settings.rates.update
-    return Driven(
-        "", with_driving(course, radius * noise), Clock(0.0, 0.0, 0), window, np.inf, None
+    return DrivenRun(
+        "", with_driving(course, radius * noise), ReadingTimes(0.0, 0.0, 0), window, np.inf, None
     )

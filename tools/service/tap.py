@@ -88,7 +88,7 @@ def play_at_once(configuration: Configuration, folder: Path, run: RunInfo, outpu
     return f"played {folder}: {counts.readings} readings, {counts.ticks} ticks; {_damage(decoders)}"
 
 
-class Counts(NamedTuple):
+class RecordedCounts(NamedTuple):
     """What came into a recording."""
 
     readings: int
@@ -101,7 +101,7 @@ def _record(
     run: RunInfo,
     readings: Iterable[Reading],
     output: Path,
-) -> Counts:
+) -> RecordedCounts:
     """Readings and the ticks they make, in the order in which the loop hands them over."""
     pipeline = Pipeline(settings)
     state, taken, ticks = pipeline.start(), 0, 0
@@ -123,7 +123,7 @@ def _record(
         taken, ticks = taken + len(tick.readings), ticks + 1
 
     writer.close()
-    return Counts(taken, ticks)
+    return RecordedCounts(taken, ticks)
 
 
 def _wires(folder: Path, settings: Settings) -> dict[str, Path]:

@@ -8,7 +8,7 @@ from math import degrees
 from typing import Any, NamedTuple
 
 
-class Shown(NamedTuple):
+class ShownValue(NamedTuple):
     """A value of a tick as people read it."""
 
     label: str
@@ -20,15 +20,15 @@ class Shown(NamedTuple):
 
 
 SHOWN = (
-    Shown("c", "cohesion", "cohesion_sigma", 1.0, "Pa", 0),
-    Shown("tan φ", "tan_phi", "tan_phi_sigma", 1.0, "", 4),
-    Shown("k", "shear_modulus", "shear_modulus_sigma", 1e3, "mm", 1),
-    Shown("slip", "slip", "slip_sigma", 100.0, "%", 1),
-    Shown("sinkage", "sinkage", "sinkage_sigma", 1e3, "mm", 2),
-    Shown("θ₁", "theta_1", "theta_1_sigma", degrees(1.0), "°", 2),
-    Shown("load", "load", "load_sigma", 1.0, "N", 2),
-    Shown("torque", "torque", "torque_sigma", 1.0, "N·m", 3),
-    Shown("pull", "drawbar_pull", "drawbar_pull_sigma", 1.0, "N", 2),
+    ShownValue("c", "cohesion", "cohesion_sigma", 1.0, "Pa", 0),
+    ShownValue("tan φ", "tan_phi", "tan_phi_sigma", 1.0, "", 4),
+    ShownValue("k", "shear_modulus", "shear_modulus_sigma", 1e3, "mm", 1),
+    ShownValue("slip", "slip", "slip_sigma", 100.0, "%", 1),
+    ShownValue("sinkage", "sinkage", "sinkage_sigma", 1e3, "mm", 2),
+    ShownValue("θ₁", "theta_1", "theta_1_sigma", degrees(1.0), "°", 2),
+    ShownValue("load", "load", "load_sigma", 1.0, "N", 2),
+    ShownValue("torque", "torque", "torque_sigma", 1.0, "N·m", 3),
+    ShownValue("pull", "drawbar_pull", "drawbar_pull_sigma", 1.0, "N", 2),
 )
 
 

@@ -121,7 +121,7 @@ def since_reversal(angle: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Shown:
+class EffectTrace:
     """What an effect changes: rms change over noise by channel, and the share of it each covariate
     explains.
     """
@@ -146,7 +146,7 @@ class Shown:
         return share[covariate] > max(LEAST, max(others) - TIE)
 
 
-def shown(effect: Effect) -> Shown:
+def shown(effect: Effect) -> EffectTrace:
     """Run the campaign with and without the effect."""
     reversing = effect.fingerprint.covariate == "reversal"
     motions, plain = campaign(reversing=reversing), _plain(reversing)
@@ -167,7 +167,7 @@ def shown(effect: Effect) -> Shown:
 
     strength = {c: float(np.sqrt(np.mean(change[c] ** 2))) / NOISE[c] for c in NOISE}
 
-    return Shown(
+    return EffectTrace(
         change, strength, {c: shares(change[c], {**by, "rate": rate[c]}) for c in NOISE}, by
     )
 

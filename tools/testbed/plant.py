@@ -20,7 +20,7 @@ from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.sensors import readings
-from gritd.tools.testbed.simulation import Run, answered, soil_of
+from gritd.tools.testbed.simulation import SimulatedRun, answered, soil_of
 
 PlantKind = Literal["original", "linear"]
 
@@ -73,10 +73,14 @@ def drawn_soil(settings: Settings, rng: np.random.Generator) -> Soil:
     )
 
 
-def drive(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion, seed: int) -> Run:
+def drive(
+    plant: PlantKind, settings: Settings, soil: Soil, motion: Motion, seed: int
+) -> SimulatedRun:
     """What the wheel does on this soil, and what the sensors send."""
     response = respond(plant, settings, soil, motion)
-    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+    return SimulatedRun(
+        motion, response, readings(settings, motion, response, np.random.default_rng(seed))
+    )
 
 
 def respond(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion) -> Response:
@@ -94,7 +98,7 @@ def linear_response(settings: Settings, soil: Soil, motion: Motion) -> Response:
     slip, direction = np.asarray(situation.slip), np.asarray(situation.direction)
     known = (wheel, soil.cohesion, soil.tan_phi, soil.shear_modulus)
 
-    def forces(theta_1: Array) -> linear.Forces:
+    def forces(theta_1: Array) -> linear.LinearForces:
         theta_m = (wheel.c1 + wheel.c2 * slip) * theta_1
         sigma_m = (
             soil.modulus * (wheel.radius * (np.cos(theta_m) - np.cos(theta_1))) ** soil.exponent

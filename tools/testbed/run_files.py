@@ -15,10 +15,10 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.terramechanics.soil import Soil
-from gritd.tools.testbed.simulation import Run
+from gritd.tools.testbed.simulation import SimulatedRun
 
 
-def write(path: Path, configuration: Configuration, info: RunInfo, run: Run) -> None:
+def write(path: Path, configuration: Configuration, info: RunInfo, run: SimulatedRun) -> None:
     """The recording, raw topics only. Raises RecordingError."""
     writer = RunWriter(path, (), configuration.text, info)
     try:
@@ -29,7 +29,12 @@ def write(path: Path, configuration: Configuration, info: RunInfo, run: Run) -> 
 
 
 def write_truth(
-    path: Path, settings: Settings, soil: Soil, acting: Sequence[Effect], run: Run, seed: int
+    path: Path,
+    settings: Settings,
+    soil: Soil,
+    acting: Sequence[Effect],
+    run: SimulatedRun,
+    seed: int,
 ) -> None:
     """PATH.truth.json with soil, effects and seed; PATH.truth.npz with the true arrays."""
     truth = {

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.config.configuration import read_text
-from gritd.estimator.config.kinds import Kind, Quantity
+from gritd.estimator.config.kinds import Kind, NumberWithUnit
 from gritd.estimator.config.schema import Key, Section
-from gritd.estimator.config.yamltree import Node, Sequence, compose, describe
+from gritd.estimator.config.yamltree import Node, YamlSequence, compose, describe
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 
@@ -50,20 +50,22 @@ class Listed:
     expected: str = "a list"
 
     def read(self, node: Node) -> tuple[tuple[object, ...], Node]:
-        if not isinstance(node, Sequence) or not node.items:
+        if not isinstance(node, YamlSequence) or not node.items:
             raise node.place.error(describe(node), self.expected)
         return tuple(self.kind.read(item)[0] for item in node.items), node
 
 
 SEGMENT = {
-    "duration": Key(Quantity("s", above=0, high=86400), "how long"),
-    "load": Key(Quantity("N", low=0, high=1e5), "weights on the axle"),
-    "slip": Key(Quantity("", low=LOCKED, high=1), "slip"),
-    "speed": Key(Quantity("m/s", low=-10, high=10), "rim speed, negative backward"),
+    "duration": Key(NumberWithUnit("s", above=0, high=86400), "how long"),
+    "load": Key(NumberWithUnit("N", low=0, high=1e5), "weights on the axle"),
+    "slip": Key(NumberWithUnit("", low=LOCKED, high=1), "slip"),
+    "speed": Key(NumberWithUnit("m/s", low=-10, high=10), "rim speed, negative backward"),
 }
 SCHEDULE = {
     "ramp": Key(
-        Quantity("s", low=0, high=3600), "time from one segment's conditions to the next", "500 ms"
+        NumberWithUnit("s", low=0, high=3600),
+        "time from one segment's conditions to the next",
+        "500 ms",
     ),
     "segments": Key(
         Listed(Section(SEGMENT, Segment), "a list of segments"), "what to do, in order"

@@ -18,7 +18,7 @@ from gritd.tools.testbed.sensors import readings
 
 
 @dataclass(frozen=True)
-class Run:
+class SimulatedRun:
     """A simulated run: what the controller was told, what happened, and what the sensors sent."""
 
     motion: Motion
@@ -28,10 +28,12 @@ class Run:
 
 def simulate_run(
     settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect], seed: int
-) -> Run:
+) -> SimulatedRun:
     """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
     response = answered(settings, soil, motion, acting)
-    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+    return SimulatedRun(
+        motion, response, readings(settings, motion, response, np.random.default_rng(seed))
+    )
 
 
 def answered(settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect]) -> Response:

@@ -36,8 +36,8 @@ from gritd.tools.testbed import plant, rig_config, run_files
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.schedule import motion_of
 from gritd.tools.testbed.sensors import START
-from gritd.tools.testbed.simulation import Run
-from gritd.tools.testbed.wires import CanKind, Rig
+from gritd.tools.testbed.simulation import SimulatedRun
+from gritd.tools.testbed.wires import CanKind, ConnectedDevices
 
 NS = 1_000_000_000
 JITTER = 0.2e-3  # [s] mean delay on the way, beyond the constant one
@@ -55,7 +55,7 @@ class Experiment:
 
     configuration: Configuration
     soil: Soil
-    run: Run
+    run: SimulatedRun
     plant: PlantKind
     seed: int
 
@@ -105,7 +105,7 @@ def in_transit(readings: Iterable[Reading], seed: int) -> list[Reading]:
 
 
 def play(
-    readings: Sequence[Reading], rig: Rig, stopped: Callable[[], bool] = lambda: False
+    readings: Sequence[Reading], rig: ConnectedDevices, stopped: Callable[[], bool] = lambda: False
 ) -> Played:
     """Send every reading when it is due, `received` [ns] after the start; returns after the last,
     or when stopped.
@@ -137,7 +137,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     prepared = experiment(configuration, arguments.seconds, arguments.plant, arguments.seed)
     write_truth(folder, prepared)
 
-    with Rig(configuration.settings, arguments.can) as rig:
+    with ConnectedDevices(configuration.settings, arguments.can) as rig:
         print(
             "configuration "
             f"{rig_config.write(configuration, rig.devices, arguments.plant, folder)}",

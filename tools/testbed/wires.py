@@ -191,7 +191,7 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Rig:
+class ConnectedDevices:
     """All devices of a configuration, connected: a reading goes in, its bytes come out on the right
     wire.
 
@@ -227,7 +227,7 @@ class Rig:
         values = self._sensors[reading.channel].sent(reading.value)
         self._ends[source.device].send(source.signal, values, reading.stamp // US)
 
-    def __enter__(self) -> Rig:
+    def __enter__(self) -> ConnectedDevices:
         return self
 
     def __exit__(self, *error: object) -> None:

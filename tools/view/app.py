@@ -20,8 +20,8 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.terramechanics.soil import Array
 
 if TYPE_CHECKING:  # the one does not load what the other needs
-    from gritd.tools.view.campaign import Campaign
-    from gritd.tools.view.feed import Feed
+    from gritd.tools.view.campaign import ViewedCampaign
+    from gritd.tools.view.feed import DaemonFeed
     from gritd.tools.view.recorded import Recordings
     from gritd.tools.view.run_curves import Along
 
@@ -32,7 +32,7 @@ KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 PAGE = resources.files("gritd.tools.view").joinpath("page")
 
 
-class Hub:
+class FrameHub:
     """The newest frame, for whoever follows. One that reads slowly gets fewer frames, and nothing
     is kept for it.
     """
@@ -65,7 +65,7 @@ class Hub:
             self.streams -= 1
 
 
-def live(feed: Feed, library: Mapping[str, Path], hub: Hub) -> Starlette:
+def live(feed: DaemonFeed, library: Mapping[str, Path], hub: FrameHub) -> Starlette:
     """The page of the running daemon."""
 
     async def about(request: Request) -> Response:
@@ -90,7 +90,9 @@ def live(feed: Feed, library: Mapping[str, Path], hub: Hub) -> Starlette:
     return _application(answers, library)
 
 
-def recorded(recordings: Recordings, campaign: Campaign, library: Mapping[str, Path]) -> Starlette:
+def recorded(
+    recordings: Recordings, campaign: ViewedCampaign, library: Mapping[str, Path]
+) -> Starlette:
     """The page of recordings."""
 
     async def about(request: Request) -> Response:

@@ -19,7 +19,7 @@ from gritd.tools.cli.offspring import ends_with_us
 NICE = ("nice", "-n", "10")
 
 
-class Campaign:
+class ViewedCampaign:
     """state: computing, done, or failed with a reason."""
 
     def __init__(self, paths: Sequence[Path]) -> None:

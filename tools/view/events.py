@@ -13,7 +13,7 @@ MOST = 500  # events kept
 GOOD, NOTE, BAD = "good", "note", "bad"
 
 
-class Event(NamedTuple):
+class ViewEvent(NamedTuple):
     """time: [s since the epoch]."""
 
     time: float
@@ -25,7 +25,7 @@ class Events:
     """Follows the reports in order."""
 
     def __init__(self) -> None:
-        self.found: deque[Event] = deque(maxlen=MOST)
+        self.found: deque[ViewEvent] = deque(maxlen=MOST)
         self.count = 0
         self._before: Report | None = None
         self._lost: set[str] = set()  # what was said to be lost
@@ -36,12 +36,12 @@ class Events:
         if before is None:
             return
         if before["pid"] != report["pid"]:
-            self.add(Event(time, NOTE, "another daemon has started"))
+            self.add(ViewEvent(time, NOTE, "another daemon has started"))
             return
         for kind, text in (*_news(before, report), *self._parts(before, report)):
-            self.add(Event(time, kind, text))
+            self.add(ViewEvent(time, kind, text))
 
-    def add(self, event: Event) -> None:
+    def add(self, event: ViewEvent) -> None:
         self.found.append(event._replace(text=visible(event.text)[:300]))
         self.count += 1
 

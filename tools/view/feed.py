@@ -20,7 +20,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.service.client import NO_GRITD, Report, connected, reports
 from gritd.tools.view.charts import CHARTS, LATENESS, drawn, fields_of, layout
 from gritd.tools.view.downsample import envelope
-from gritd.tools.view.events import BAD, NOTE, Event, Events
+from gritd.tools.view.events import BAD, NOTE, Events, ViewEvent
 from gritd.tools.view.frame import Setup, frame
 from gritd.tools.view.history import LONGEST, History
 
@@ -34,7 +34,7 @@ Told = Callable[[bytes], None]
 Taken = Callable[[Report], None]
 
 
-class Feed:
+class DaemonFeed:
     """Follows the daemon until closed, also over its end and its next start."""
 
     def __init__(self, socket: str | None) -> None:
@@ -121,7 +121,7 @@ class Feed:
             self._history.begin_anew()
         if self._trouble:
             self._trouble = ""
-            self._events.add(Event(now, NOTE, "the daemon answers"))
+            self._events.add(ViewEvent(now, NOTE, "the daemon answers"))
         self._events.look(report, now)
 
         setup = json.dumps(report.get("setup"))
@@ -145,7 +145,9 @@ class Feed:
                 last = self._history.last  # by the daemon's clock, which need not be ours
                 known = last > -inf
                 self._history.interrupt()
-                self._events.add(Event(last if known else time.time(), BAD if known else NOTE, why))
+                self._events.add(
+                    ViewEvent(last if known else time.time(), BAD if known else NOTE, why)
+                )
             self._trouble = why
             marks = self._events.count
 

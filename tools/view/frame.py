@@ -13,7 +13,7 @@ from gritd.estimator.terramechanics.soil import Wheel
 from gritd.estimator.visible import visible
 from gritd.tools.cli.wording import NOTHING, fixed, honesty
 from gritd.tools.service.client import Report
-from gritd.tools.service.wording import SHOWN, Shown, age
+from gritd.tools.service.wording import SHOWN, ShownValue, age
 from gritd.tools.view.charts import BAND
 from gritd.tools.view.rim import rim
 from gritd.tools.view.words import headline
@@ -27,7 +27,7 @@ CHANNELS = {
     "wrench": ("force/torque sensor", "drawbar_pull_sigma", 1.0, "N", 2),
     "motor_temperature": ("motor temperature", "", 1.0, "°C", 1),
 }
-PULL = Shown("largest pull", "drawbar_pull_max", "drawbar_pull_max_sigma", 1.0, "N", 2)
+PULL = ShownValue("largest pull", "drawbar_pull_max", "drawbar_pull_max_sigma", 1.0, "N", 2)
 SOIL = 3  # of SHOWN, what is learnt
 
 
@@ -80,7 +80,7 @@ def frame(report: Report, setup: Setup) -> dict[str, Any]:
     }
 
 
-def _value(tick: Mapping[str, Any], shown: Shown) -> dict[str, str]:
+def _value(tick: Mapping[str, Any], shown: ShownValue) -> dict[str, str]:
     return {
         "label": shown.label,
         "value": _number(tick.get(shown.value), shown.factor, shown.decimals),

@@ -34,7 +34,7 @@ TABLES = {"/tick": TICK_FIELDS}
 
 
 @dataclass
-class Run:
+class ViewedRun:
     """One recording. The curves are replaced when all of it is read."""
 
     path: Path
@@ -73,7 +73,7 @@ class Recordings:
 
     def __init__(self, paths: Sequence[Path], looked: Callable[[], None] = _nothing) -> None:
         """`looked` is called after the first look at each."""
-        self.runs: list[Run] = []
+        self.runs: list[ViewedRun] = []
         for path in paths:
             self.runs.append(first_look(path))
             looked()
@@ -160,7 +160,7 @@ def _condition(tick: dict[str, Any], bit: int) -> str:
     return "stale" if tick["stale"] & bit else "stuck" if tick["stuck"] & bit else "ok"
 
 
-def first_look(path: Path) -> Run:
+def first_look(path: Path) -> ViewedRun:
     """A run, all of it where that is quick. Raises CommandError."""
     try:
         whole = path.stat().st_size <= SMALL
@@ -176,7 +176,7 @@ def first_look(path: Path) -> Run:
     damage = recording.damage if whole else []
     run = recording.run
     of_run = (run.nominal_load, _setup(recording, name), curves, damage, run.operator, run.notes)
-    return Run(path, name, *of_run)
+    return ViewedRun(path, name, *of_run)
 
 
 def _curves(recording: Recording, whole: bool) -> RunCurves:

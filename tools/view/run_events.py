@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag
-from gritd.tools.view.events import BAD, GOOD, MOST, NOTE, Event
+from gritd.tools.view.events import BAD, GOOD, MOST, NOTE, ViewEvent
 from gritd.tools.view.run_curves import RunCurves, changes, rises
 
 
-def events_of(run: RunCurves) -> list[Event]:
+def events_of(run: RunCurves) -> list[ViewEvent]:
     """In order; times since the start of the run [s]."""
-    found = [Event(float(run.time[row]), kind, text) for row, kind, text in _found(run)]
+    found = [ViewEvent(float(run.time[row]), kind, text) for row, kind, text in _found(run)]
     return sorted(found)[:MOST]
 
 

@@ -29,7 +29,7 @@ HEAD = 16 << 10  # [bytes] of a request's head
 
 
 @dataclass(frozen=True)
-class Place:
+class ListenAddress:
     """Where to listen, and whom to let in."""
 
     host: str = "127.0.0.1"
@@ -94,7 +94,7 @@ def _address(transport: asyncio.BaseTransport) -> str:
     return str(peer[0]) if peer else ""
 
 
-def listening(place: Place, elsewhere: bool = False) -> socket.socket:
+def listening(place: ListenAddress, elsewhere: bool = False) -> socket.socket:
     """A socket at the place; where its port is taken and `elsewhere`, at a free one. Raises
     CommandError.
     """
@@ -114,7 +114,10 @@ def listening(place: Place, elsewhere: bool = False) -> socket.socket:
 
 
 def serve(
-    app: ASGIApp, place: Place, listener: socket.socket, begun: Callable[[], None] = lambda: None
+    app: ASGIApp,
+    place: ListenAddress,
+    listener: socket.socket,
+    begun: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve until SIGTERM or SIGINT. `begun` is called in the loop before the first request."""
 

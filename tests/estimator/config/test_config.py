@@ -11,7 +11,7 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
-from gritd.estimator.config.kinds import Quantity
+from gritd.estimator.config.kinds import NumberWithUnit
 from gritd.estimator.config.settings import (
     Channel,
     ConfiguredEffect,
@@ -147,8 +147,8 @@ def test_effects_of_a_recording_are_read_without_a_library() -> None:
     (effect,) = read.settings.effects
     assert effect.name == "of_tomorrow" and effect.parameters.keys() == {"loss"}
 
-    def schema(name: str) -> dict[str, Quantity]:
-        return {"loss": Quantity("N*m"), "rate": Quantity("1/s")}
+    def schema(name: str) -> dict[str, NumberWithUnit]:
+        return {"loss": NumberWithUnit("N*m"), "rate": NumberWithUnit("1/s")}
 
     with pytest.raises(ConfigError, match=re.escape("effects.of_tomorrow.rate: found nothing")):
         config.loads(MINIMAL + named, "rig.yaml", effect_schema=schema)
@@ -166,10 +166,11 @@ def test_effects_are_read_into_si() -> None:
 
 
 def test_effects_are_checked_against_a_schema() -> None:
-    def schema(name: str) -> dict[str, Quantity] | None:
-        return {"coulomb_friction": {"loss": Quantity("N*m")}, "other": {"gain": Quantity("")}}.get(
-            name
-        )
+    def schema(name: str) -> dict[str, NumberWithUnit] | None:
+        return {
+            "coulomb_friction": {"loss": NumberWithUnit("N*m")},
+            "other": {"gain": NumberWithUnit("")},
+        }.get(name)
 
     assert config.loads(MINIMAL + EFFECTS, "rig.yaml", effect_schema=schema).settings.effects
     for old, new, words in [

@@ -19,7 +19,7 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.stages.situation import Motion
-from gritd.tools.commands.simulate import Run, simulate_run, soil_of, write
+from gritd.tools.commands.simulate import SimulatedRun, simulate_run, soil_of, write
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 
 CONFIGURATION = config.load(packaged())
@@ -32,14 +32,14 @@ SCHEDULE = Schedule(
 
 
 @pytest.fixture(scope="module")
-def made() -> Run:
+def made() -> SimulatedRun:
     return simulate_run(
         SETTINGS, soil_of(SETTINGS), motion_of(SCHEDULE, SETTINGS.wheel.radius, RATE), (), seed=3
     )
 
 
 @pytest.fixture(scope="module")
-def recording(made: Run, tmp_path_factory: pytest.TempPathFactory) -> Recording:
+def recording(made: SimulatedRun, tmp_path_factory: pytest.TempPathFactory) -> Recording:
     path = tmp_path_factory.mktemp("run") / "run.mcap"
     write(path, CONFIGURATION, RunInfo(name="run", pass_number=3, start_position=0.4), made)
     return read(path)
@@ -50,12 +50,12 @@ def motion(recording: Recording) -> Motion:
     return recorded_motion(recording, SETTINGS, RATE)
 
 
-def at(motion: Motion, made: Run, values: object) -> np.ndarray:
+def at(motion: Motion, made: SimulatedRun, values: object) -> np.ndarray:
     """The truth at the centres of the windows."""
     return np.interp(motion.time, made.motion.time, np.asarray(values))
 
 
-def test_motion_is_the_one_driven(motion: Motion, made: Run) -> None:
+def test_motion_is_the_one_driven(motion: Motion, made: SimulatedRun) -> None:
     for name, spread in (
         ("wheel_angle", 1e-3), ("wheel_speed", 2e-3), ("carriage_speed", 2e-4), ("load", 1.5),
     ):  # fmt: skip
@@ -68,7 +68,7 @@ def test_motion_is_the_one_driven(motion: Motion, made: Run) -> None:
     assert motion.pass_number == 3.0 and motion.start_position == 0.4
 
 
-def test_forward_model_driven_by_it_says_what_was_felt(motion: Motion, made: Run) -> None:
+def test_forward_model_driven_by_it_says_what_was_felt(motion: Motion, made: SimulatedRun) -> None:
     again = simulate_arrays(
         SETTINGS.wheel,
         soil_of(SETTINGS),

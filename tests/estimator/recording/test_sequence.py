@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.recording.salvage import read
-from gritd.estimator.recording.sequence import Sequence
+from gritd.estimator.recording.sequence import ChunkSequence
 from gritd.tools.commands import recover
 from tests.estimator.recording.samples import pieces, write_sample
 
@@ -27,7 +27,7 @@ def chunk_of(first: int, count: int, wrap: int = 2**32) -> dict[int, tuple[int, 
 def test_chunks_that_count_on_are_in_place_through_gaps_and_wraps(
     start: int, sizes: list[int], gap: int
 ) -> None:
-    sequence, number = Sequence(), start
+    sequence, number = ChunkSequence(), start
     for size in sizes:
         assert sequence.add(chunk_of(number, size))
         number += size + gap

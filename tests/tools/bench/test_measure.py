@@ -14,7 +14,7 @@ from gritd.tools.bench import against, diagnosis, forward, live, measure, peers
 from gritd.tools.testbed.simulation import soil_of
 from tests.tools.bench.samples import FIGURES
 
-SMALL = measure.Sizes(
+SMALL = measure.BenchSizes(
     seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0
 )
 SECTIONS = (
@@ -137,7 +137,7 @@ def test_another_rate_is_that_of_the_loop_and_of_every_sensor(tmp_path):
 
 
 def test_a_long_recording_is_replayed_whole(tmp_path):
-    found = measure.long_replay(measure.Sizes(long=30.0), tmp_path)
+    found = measure.long_replay(measure.BenchSizes(long=30.0), tmp_path)
     assert found["windows"] == pytest.approx(300, abs=2)
     assert found["speed"] == pytest.approx(30.0 / (found["reading"] + found["filter"]))
 

@@ -12,7 +12,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.commands import init
-from gritd.tools.importers.recording import Stream, write
+from gritd.tools.importers.recording import ChannelReadings, write
 
 Array = NDArray[np.float64]
 RATE = 100.0  # [Hz]
@@ -28,7 +28,7 @@ def rig(folder: Path) -> Path:
 def record(path: Path, channels: Mapping[str, tuple[Array, Array]]) -> Path:
     """Channels as seconds and raw values."""
     streams = [
-        Stream(
+        ChannelReadings(
             name,
             START + np.round(seconds * 1e9).astype(np.int64),
             np.round(raw).astype(np.int64) if name.endswith("encoder") else raw,

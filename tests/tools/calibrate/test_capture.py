@@ -16,7 +16,7 @@ from gritd.estimator.messages.readings import Reading
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.commands import calibrate
 from gritd.tools.testbed import rig_config
-from gritd.tools.testbed.wires import Rig
+from gritd.tools.testbed.wires import ConnectedDevices
 from tests.tools.calibrate.bench import rig as described
 
 Raw = Mapping[str, float | int | tuple[float, ...]]
@@ -30,7 +30,7 @@ def sensing(folder: Path, at: Callable[[float], Raw]) -> Iterator[Path]:
     configuration = config.load(described(folder / "bench"))
     stopped = threading.Event()
 
-    with Rig(configuration.settings, "slcan") as wires:
+    with ConnectedDevices(configuration.settings, "slcan") as wires:
         written = rig_config.write(configuration, wires.devices, "original", folder)
 
         def play() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.calibrate.outcome import Outcome
+from gritd.tools.calibrate.outcome import CalibrationOutcome
 from gritd.tools.calibrate.procedures import pot, torque
 from gritd.tools.calibrate.sources import Recorded
 from gritd.tools.cli.command import CommandError
@@ -24,7 +24,7 @@ SEEDS = range(5)
 
 def heights(
     path: Path, seed: int, spikes: float = 0.0, creep: float = 0.0, noise: float = 2e-3
-) -> Outcome:
+) -> CalibrationOutcome:
     """A potentiometer on gauge blocks; so much of the readings are anything, and its zero creeps by
     so much of the span.
     """
@@ -74,7 +74,7 @@ def test_a_loose_contact_is_refused(tmp_path: Path) -> None:
         heights(tmp_path / "r.mcap", 1, spikes=0.15)
 
 
-def spin(path: Path, seed: int, spikes: float = 0.0, creep: float = 0.0) -> Outcome:
+def spin(path: Path, seed: int, spikes: float = 0.0, creep: float = 0.0) -> CalibrationOutcome:
     """A lifted wheel, 0.3 N·m and 0.5 N·m·s/rad; creep in A a second."""
     time, speed = staircase([0.0, 0.2, 0.4, 0.6, 0.0, -0.2, -0.4, -0.6], seconds=5.0)
     current = (0.3 * np.sign(speed) + 0.5 * speed) / 2.0 + creep * time

@@ -12,7 +12,7 @@ import pytest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import diagnose
 from gritd.tools.commands import diagnose_campaigns as campaigns
-from gritd.tools.commands.diagnose_campaigns import Campaign
+from gritd.tools.commands.diagnose_campaigns import CampaignFiles
 from tests.tools.commands.certificates import certificates
 
 
@@ -25,7 +25,7 @@ def folder_of(place: Path, name: str, configurations: int = 1) -> Path:
     return folder
 
 
-def write_result(campaign: Campaign) -> str:
+def write_result(campaign: CampaignFiles) -> str:
     """In the place of a diagnosis."""
     if campaign.folder.name == "bad":
         return "not diagnosed: run-1.mcap: not an MCAP file"

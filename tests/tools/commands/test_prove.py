@@ -124,7 +124,7 @@ def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(sealed: Path, tmp_
     assert {name: again[name] for name in DRAWN} == {name: drawn[name] for name in DRAWN}
 
 
-def answers(spec: trial.Spec) -> dict[str, object]:
+def answers(spec: trial.WorkerSpec) -> dict[str, object]:
     """The sealed answers of a case."""
     sealed: dict[str, object] = json.loads(spec.answers.read_text(encoding="utf-8"))["answers"]
     return sealed

@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from gritd.tools.dev import fits
-from gritd.tools.dev.fits import Case, Compared, Outcome
+from gritd.tools.dev.fits import Compared, FitCase, FitOutcome
 
 OFF = "off by more than 0.5 nats from where the descent ended: "
 
 
-def _compared(case: Case) -> Outcome:
+def _compared(case: FitCase) -> FitOutcome:
     """Two fits of each campaign, the second off where the campaign is the second."""
     gain = 2.0 if case.name.endswith("b") else 0.1
     rows = (
         Compared(case.name, (), 100.0, True, 0.0, 0.0),
         Compared(case.name, ("multipass",), 90.0, True, gain, 0.0),
     )
-    return Outcome(case.name, rows)
+    return FitOutcome(case.name, rows)
 
 
 def _campaign(folder: Path, *parts: str) -> None:
@@ -51,6 +51,6 @@ def test_a_stopped_comparison_goes_on_where_it_was(
 
 
 def test_every_deciding_fit_of_a_drawn_campaign_stands_at_its_optimum() -> None:
-    outcome = fits.run_case(Case(None, 3, 0))
+    outcome = fits.run_case(FitCase(None, 3, 0))
     assert outcome.rows and not outcome.failed
     assert all(row.converged and row.gain < fits.LIMIT for row in outcome.rows)

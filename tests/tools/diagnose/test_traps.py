@@ -15,7 +15,7 @@ from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
-from gritd.tools.proof.ours.unlisted import BentRail, CableDrag
+from gritd.tools.proof.ours.unlisted import BentRail, CableChainDrag
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
 
 
@@ -89,8 +89,8 @@ def test_slope_and_crosstalk_are_one_group() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stranger", [BentRail(size=1e-3), CableDrag(size=8.0)])
-def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableDrag) -> None:
+@pytest.mark.parametrize("stranger", [BentRail(size=1e-3), CableChainDrag(size=8.0)])
+def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableChainDrag) -> None:
     found = diagnosed(plan(), (stranger,))
     assert found.verdict == "unlisted", found.summary
     assert max(h.probability for h in found.hypotheses) <= 0.5

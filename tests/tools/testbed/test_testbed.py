@@ -23,7 +23,7 @@ from gritd.tools.testbed import plant, rig_config
 from gritd.tools.testbed.schedule import motion_of
 from gritd.tools.testbed.simulation import soil_of
 from gritd.tools.testbed.testbed import experiment, in_transit
-from gritd.tools.testbed.wires import Rig, has_multicast
+from gritd.tools.testbed.wires import ConnectedDevices, has_multicast
 from tests.drivers.rig import Ticking, wait_until
 
 TESTBED = config.load(packaged())
@@ -113,7 +113,7 @@ def assert_nearly_all_and_nothing_else(sent, received):
 @buses
 def test_every_reading_arrives_as_it_was_sent(bus, tmp_path):
     readings = in_transit(experiment(TESTBED, 8.0, "linear", 3).run.readings, 0)[6000:6900]
-    with Rig(TESTBED.settings, bus) as rig:
+    with ConnectedDevices(TESTBED.settings, bus) as rig:
         path = rig_config.write(TESTBED, rig.devices, "linear", tmp_path)
         with Daemon(path) as daemon:
             begin = time.monotonic_ns() - readings[0].stamp
@@ -203,7 +203,7 @@ def pipeline_over(settings, readings):
 
 
 def test_the_configuration_stands_alone_in_its_folder(tmp_path):
-    with Rig(TESTBED.settings, "slcan") as rig:
+    with ConnectedDevices(TESTBED.settings, "slcan") as rig:
         path = rig_config.write(TESTBED, rig.devices, "linear", tmp_path)
         written = config.load(path).settings
         assert written.devices["encoders"].port == rig.devices["encoders"].port
@@ -215,7 +215,7 @@ def test_the_configuration_stands_alone_in_its_folder(tmp_path):
 
 def test_only_the_linear_plant_runs_without_the_correction_of_the_closed_forms(tmp_path):
     names = {}
-    with Rig(TESTBED.settings, "slcan") as rig:
+    with ConnectedDevices(TESTBED.settings, "slcan") as rig:
         for kind in ("linear", "original"):
             (tmp_path / kind).mkdir()
             path = rig_config.write(TESTBED, rig.devices, kind, tmp_path / kind)

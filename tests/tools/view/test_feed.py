@@ -14,7 +14,7 @@ import pytest
 
 from gritd.estimator.daemon.publish import Publisher
 from gritd.tools.view.charts import CHARTS, LATENESS, drawn, fields_of
-from gritd.tools.view.feed import Feed
+from gritd.tools.view.feed import DaemonFeed
 from tests.tools.view.samples import TICK, daemon, report
 
 Frames = Queue[dict[str, Any]]
@@ -25,7 +25,7 @@ LONG = 180.0  # [s] ends a test that has failed
 def followed(tmp_path: Path) -> Any:
     """A feed of the socket in the folder, and the frames it makes."""
     frames: Frames = Queue()
-    with closing(Feed(str(tmp_path / "gritd.sock"))) as feed:
+    with closing(DaemonFeed(str(tmp_path / "gritd.sock"))) as feed:
         feed.start(lambda frame: frames.put(json.loads(frame)))
         yield feed, frames
 

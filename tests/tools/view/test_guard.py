@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import pytest
 
 pytest.importorskip("starlette", reason="needs gritd[view]")
-from gritd.tools.view.app import Hub, live
-from gritd.tools.view.feed import Feed
+from gritd.tools.view.app import FrameHub, live
+from gritd.tools.view.feed import DaemonFeed
 from gritd.tools.view.guard import BURST, Guard
 from gritd.tools.view.library import library
 
 TOKEN = "0123456789abcdef0123"
-APP = live(Feed(None), library(), Hub())
+APP = live(DaemonFeed(None), library(), FrameHub())
 
 
 class Answer(NamedTuple):

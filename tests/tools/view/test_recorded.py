@@ -15,7 +15,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay
 from gritd.tools.view import recorded
-from gritd.tools.view.campaign import Campaign
+from gritd.tools.view.campaign import ViewedCampaign
 from gritd.tools.view.charts import CHARTS
 from gritd.tools.view.downsample import envelope
 from gritd.tools.view.recorded import Recordings
@@ -121,7 +121,7 @@ def test_what_two_runs_were_made_with_is_compared(recordings: Recordings) -> Non
 
 
 def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path]) -> None:
-    campaign = Campaign(paths)
+    campaign = ViewedCampaign(paths)
     assert campaign.told == {"state": "computing"}
     campaign._run()
     assert campaign.told["state"] == "done" and len(campaign.told["runs"]) == 2
@@ -135,7 +135,7 @@ def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path
 
 
 def test_a_campaign_that_cannot_be_computed_says_why(tmp_path: Path) -> None:
-    campaign = Campaign([tmp_path / "none.mcap"])
+    campaign = ViewedCampaign([tmp_path / "none.mcap"])
     campaign._run()
     assert campaign.told["state"] == "failed" and "none.mcap" in campaign.told["reason"]
 

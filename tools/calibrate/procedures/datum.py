@@ -10,7 +10,7 @@ from scipy.stats import norm, t
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.calibrate.outcome import Calibrated, Outcome
+from gritd.tools.calibrate.outcome import CalibratedKey, CalibrationOutcome
 from gritd.tools.calibrate.sources import Signal, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
@@ -68,7 +68,7 @@ def _at(time: Array, volts: Array, instant: float) -> float | None:
     return float(np.polyfit(time[inside] - instant, volts[inside], 1)[1])
 
 
-def outcome(volts: Sequence[float], settings: Settings) -> Outcome:
+def outcome(volts: Sequence[float], settings: Settings) -> CalibrationOutcome:
     """The offset that makes the mean of the touches zero."""
     scale = settings.channels["sinkage_pot"].calibration.scale.value
     heights = -scale * np.asarray(volts)
@@ -86,8 +86,8 @@ def outcome(volts: Sequence[float], settings: Settings) -> Outcome:
         f"touch {number}: {v:.5g} V, {1e3 * (h - offset.value):+.3f} mm from the mean"
         for number, (v, h) in enumerate(zip(volts, heights, strict=True), start=1)
     ]
-    datum = Calibrated(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
-    return Outcome((datum,), ("channels", "sinkage_pot"), tuple(rows), tuple(warnings))
+    datum = CalibratedKey(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
+    return CalibrationOutcome((datum,), ("channels", "sinkage_pot"), tuple(rows), tuple(warnings))
 
 
 def _few(count: int) -> float:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from gritd.estimator.config.settings import Uncertain
 from gritd.tools.calibrate.line import Point, fitted
-from gritd.tools.calibrate.outcome import Outcome
-from gritd.tools.calibrate.sources import Signal, Source
+from gritd.tools.calibrate.outcome import CalibrationOutcome
+from gritd.tools.calibrate.sources import CalibrationSource, Signal
 from gritd.tools.calibrate.straight import Straight
 
 SUMMARY = "turns of the wheel by hand, or lengths of rail: the angle of a count"
@@ -32,8 +32,11 @@ CARRIAGE = Straight(
 
 
 def outcome(
-    procedure: Straight, source: Source, known: Sequence[Uncertain], pulley_radius: float = 1.0
-) -> Outcome:
+    procedure: Straight,
+    source: CalibrationSource,
+    known: Sequence[Uncertain],
+    pulley_radius: float = 1.0,
+) -> CalibrationOutcome:
     """`known` in rad, or in m of rail, which the pulley's radius [m] makes an angle. Raises
     CommandError.
     """

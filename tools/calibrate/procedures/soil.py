@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate import spikes
-from gritd.tools.calibrate.outcome import Calibrated, Outcome
+from gritd.tools.calibrate.outcome import CalibratedKey, CalibrationOutcome
 from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
 
 SUMMARY = "plate tests: sinkage exponent and moduli with their scatter, into the soil's prior"
@@ -137,7 +137,7 @@ def modulus(press: Press, n: float) -> float:
     return float(np.exp(np.average(logs, weights=weight)))
 
 
-def outcome(tests: Sequence[Press], settings: Settings) -> Outcome:
+def outcome(tests: Sequence[Press], settings: Settings) -> CalibrationOutcome:
     """Exponent and moduli of all tests. Raises CommandError."""
     each = np.array([exponent(test) for test in tests])
     good = [t for t, n in zip(tests, each, strict=True) if EXPONENTS[0] <= n <= EXPONENTS[1]]
@@ -156,12 +156,14 @@ def outcome(tests: Sequence[Press], settings: Settings) -> Outcome:
 
     at_width = k_c / width + k_phi
     values = (
-        Calibrated(("soil", "exponent"), n, ""),
-        Calibrated(("soil", "k_c"), _rounded(k_c, 4), "Pa/m^(n-1)", "kN/m^(n+1)"),
-        Calibrated(("soil", "k_phi"), _rounded(k_phi, 4), "Pa/m^n", "kN/m^(n+2)"),
-        Calibrated(("soil", "modulus_sigma"), _rounded(min(sigma / at_width, 1.0), 2), "", "%"),
+        CalibratedKey(("soil", "exponent"), n, ""),
+        CalibratedKey(("soil", "k_c"), _rounded(k_c, 4), "Pa/m^(n-1)", "kN/m^(n+1)"),
+        CalibratedKey(("soil", "k_phi"), _rounded(k_phi, 4), "Pa/m^n", "kN/m^(n+2)"),
+        CalibratedKey(("soil", "modulus_sigma"), _rounded(min(sigma / at_width, 1.0), 2), "", "%"),
     )
-    return Outcome(values, lines=tuple(_rows(good, moduli, each)), warnings=tuple(warnings))
+    return CalibrationOutcome(
+        values, lines=tuple(_rows(good, moduli, each)), warnings=tuple(warnings)
+    )
 
 
 def _moduli(radius: Array, moduli: Array, width: float) -> tuple[float, float, float, list[str]]:

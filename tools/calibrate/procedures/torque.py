@@ -14,9 +14,9 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate import creep
 from gritd.tools.calibrate.line import Point, fitted
-from gritd.tools.calibrate.outcome import Calibrated, Outcome, residual_table
+from gritd.tools.calibrate.outcome import CalibratedKey, CalibrationOutcome, residual_table
 from gritd.tools.calibrate.plateaus import between, mean_of, plateaus
-from gritd.tools.calibrate.sources import Signal, Source, series, start_of
+from gritd.tools.calibrate.sources import CalibrationSource, Signal, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
 SUMMARY = "torques on a lever, a wheel spun in the air, or a torque sensor: constant and friction"
@@ -33,15 +33,17 @@ READINGS = 20  # of each; a slower log is compared over longer
 # --- a lever ---
 
 
-def by_lever(source: Source, known: Sequence[Uncertain], settings: Settings) -> Outcome:
+def by_lever(
+    source: CalibrationSource, known: Sequence[Uncertain], settings: Settings
+) -> CalibrationOutcome:
     """Torque over current while known torques [N·m] are held. Raises CommandError."""
     line = fitted([_ampere(p, settings) for p in source.points(SHUNT, known)])
     shunt = settings.channels["motor_shunt"].calibration.scale
     relative = shunt.sigma / abs(shunt.value)
     spread = float(np.hypot(line.scale.sigma, line.scale.value * relative))
 
-    return Outcome(
-        (Calibrated(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
+    return CalibrationOutcome(
+        (CalibratedKey(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
         lines=tuple(residual_table(line, "A", "N*m")),
         warnings=line.warnings,
         fits=(("drive.torque_constant", line),),
@@ -66,7 +68,7 @@ class Spin:
     torque: Uncertain
 
 
-def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
+def by_spinning(recorded: Recording, settings: Settings) -> CalibrationOutcome:
     """K I = T_C sign ω + B ω + K I₀ over steady speeds both ways, of a wheel without load. Raises
     CommandError.
     """
@@ -88,11 +90,11 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
     before = settings.channels["motor_shunt"].calibration.offset.value
     offset = Uncertain(before - values[2] / constant, spread[2] / constant)
     constants = (
-        Calibrated(("effects", "coulomb_friction", "loss"), _positive(values, spread, 0), "N·m"),
-        Calibrated(
+        CalibratedKey(("effects", "coulomb_friction", "loss"), _positive(values, spread, 0), "N·m"),
+        CalibratedKey(
             ("effects", "viscous_friction", "damping"), _positive(values, spread, 1), "N·m·s/rad"
         ),
-        Calibrated(("channels", "motor_shunt", "offset"), offset, "A", "A"),
+        CalibratedKey(("channels", "motor_shunt", "offset"), offset, "A", "A"),
     )
     warnings = list(notes)
     if excess > 3.0:
@@ -106,7 +108,7 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
         f"residual {rest:+.4f} N*m"
         for s, rest in zip(spins, left.tolist(), strict=True)
     ]
-    return Outcome(constants, ("channels", "motor_shunt"), tuple(rows), tuple(warnings))
+    return CalibrationOutcome(constants, ("channels", "motor_shunt"), tuple(rows), tuple(warnings))
 
 
 def _positive(values: Array, spread: Array, at: int) -> Uncertain:
@@ -169,7 +171,7 @@ def _offset(recorded: Recording, signal: Signal, other: Signal) -> float:
 # --- a torque sensor ---
 
 
-def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
+def by_sensor(recorded: Recording, settings: Settings) -> CalibrationOutcome:
     """T of the sensor over the motor's current while the wheel drives one way; losses that do not
     change with the torque are in the offset. Raises CommandError.
     """
@@ -208,8 +210,8 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
         f"residual {line.rms:.3g} N*m r.m.s., {usual:.2g} N*m expected",
         f"the motor's torque is {-line.offset.value:.3g} N*m more than the sensor's at no torque",
     )
-    return Outcome(
-        (Calibrated(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
+    return CalibrationOutcome(
+        (CalibratedKey(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
         lines=rows,
         warnings=(*line.warnings, *notes),
         fits=(("drive.torque_constant", line),),

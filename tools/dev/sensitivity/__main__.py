@@ -22,7 +22,7 @@ from pathlib import Path
 from gritd.tools.cli.command import Parser
 from gritd.tools.dev.sensitivity.numbers import named
 from gritd.tools.dev.sensitivity.page import by_hand, page
-from gritd.tools.dev.sensitivity.runs import Kept, Runs, run
+from gritd.tools.dev.sensitivity.runs import DiagnosedRuns, Kept, run
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -34,7 +34,7 @@ def main(argv: Sequence[str]) -> int:
     _check(given, folders)
     chosen = [folders[name] for name in given.only or folders]
 
-    def write(runs: Runs) -> None:
+    def write(runs: DiagnosedRuns) -> None:
         of = f"It was begun on {Kept(given.results).begun}."
         shown = by_hand(given.out.read_text(encoding="utf-8")) if given.out.exists() else ""
         given.out.write_text(page(runs, given.fields, folders, of, shown), encoding="utf-8")

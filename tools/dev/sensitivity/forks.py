@@ -23,13 +23,13 @@ from typing import Any
 
 from gritd.tools.cli.offspring import bind_to
 from gritd.tools.dev.sensitivity.numbers import Field, changed, watched
-from gritd.tools.dev.sensitivity.outcome import Diagnose, Outcome
+from gritd.tools.dev.sensitivity.outcome import Diagnose, DiagnosisOutcome
 
-Told = Callable[["Case", Outcome | None, float], None]
+Told = Callable[["SensitivityCase", DiagnosisOutcome | None, float], None]
 
 
 @dataclass(frozen=True)
-class Case:
+class SensitivityCase:
     """A campaign to diagnose with one number times a factor."""
 
     campaign: str
@@ -38,22 +38,22 @@ class Case:
 
 
 @dataclass
-class Reading:
+class BaseDiagnosis:
     """A diagnosis with the numbers as they are.
 
     last: of each number that it reads, how many rooms had handed on when it was read last.
     digests: of what the rooms hand on.
     """
 
-    outcome: Outcome = field(default_factory=lambda: Outcome("failed"))
+    outcome: DiagnosisOutcome = field(default_factory=lambda: DiagnosisOutcome("failed"))
     last: dict[Field, int] = field(default_factory=dict)
     digests: list[bytes] = field(default_factory=list)
     seconds: float = 0.0
 
 
-def read_by(diagnose: Diagnose, folder: Path) -> Reading:
+def read_by(diagnose: Diagnose, folder: Path) -> BaseDiagnosis:
     """A diagnosis with the numbers as they are, what it reads and hands on, and its seconds."""
-    reading, began = Reading(), time.process_time()
+    reading, began = BaseDiagnosis(), time.process_time()
 
     def noticed(number: Field) -> None:
         reading.last[number] = len(reading.digests)
@@ -78,15 +78,22 @@ class Forks:
     """
 
     def __init__(
-        self, reading: Reading, cases: Collection[Case], jobs: int, told: Told, end: float
+        self,
+        reading: BaseDiagnosis,
+        cases: Collection[SensitivityCase],
+        jobs: int,
+        told: Told,
+        end: float,
     ) -> None:
         self._reading, self._told, self._end = reading, told, end
-        self._cases: dict[Field, list[tuple[Case, Any]]] = {}  # with the number's other value
+        self._cases: dict[
+            Field, list[tuple[SensitivityCase, Any]]
+        ] = {}  # with the number's other value
         for case in cases:
             value = changed(case.field.value, case.field.unit, case.factor)
             self._cases.setdefault(case.field, []).append((case, value))
         self._places, self._children = jobs, set[int]()
-        self._case: Case | None = None  # of a child
+        self._case: SensitivityCase | None = None  # of a child
         self._handed = 0  # how often a room has handed on
 
     def run(self, diagnose: Diagnose, folder: Path) -> None:
@@ -103,13 +110,13 @@ class Forks:
                     os._exit(1)
                 self._end_children()
 
-    def _run(self, diagnose: Diagnose, folder: Path) -> Outcome:
+    def _run(self, diagnose: Diagnose, folder: Path) -> DiagnosisOutcome:
         try:
             return diagnose(folder, self._compare)
         except Exception as error:  # a child's number may break what no real value does
             if self._case is None:
                 raise
-            return Outcome(f"failed: {type(error).__name__}")
+            return DiagnosisOutcome(f"failed: {type(error).__name__}")
 
     def _first_read(self, number: Field) -> None:
         """Before the number is read: the children go on from here."""
@@ -124,7 +131,7 @@ class Forks:
                 self._change(number, value)
                 return
 
-    def _fork(self, case: Case) -> None:
+    def _fork(self, case: SensitivityCase) -> None:
         parent = os.getpid()
         if child := os.fork():
             self._children.add(child)
@@ -150,7 +157,7 @@ class Forks:
         if _digest(handed) == self._reading.digests[before]:
             self._leave(None)
 
-    def _leave(self, outcome: Outcome | None) -> None:
+    def _leave(self, outcome: DiagnosisOutcome | None) -> None:
         """The end of a child, without what its parent does at its own end."""
         assert self._case
         try:

@@ -22,11 +22,11 @@ from gritd.tools.diagnose.search.search import search_models
 from gritd.tools.diagnose.verdict.decide import decide
 
 Handed = Callable[..., None]  # is told all that a room hands on, before the next one has it
-Diagnose = Callable[[Path, Handed], "Outcome"]
+Diagnose = Callable[[Path, Handed], "DiagnosisOutcome"]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DiagnosisOutcome:
     """What counts of a diagnosis: probabilities by effect, tan φ and its standard deviation."""
 
     verdict: str
@@ -46,7 +46,7 @@ class Moved:
     sigmas: float
 
     @classmethod
-    def between(cls, before: Outcome, after: Outcome) -> Moved:
+    def between(cls, before: DiagnosisOutcome, after: DiagnosisOutcome) -> Moved:
         """sigmas: change of tan φ in its standard deviation before; 0 without a soil."""
         every = {*before.probabilities, *after.probabilities}
         most = max(
@@ -63,7 +63,7 @@ class Moved:
         return self == Moved(False, False, 0.0, 0.0)
 
 
-def diagnosed(folder: Path, handed: Handed = lambda *_: None) -> Outcome:
+def diagnosed(folder: Path, handed: Handed = lambda *_: None) -> DiagnosisOutcome:
     """A campaign up to its verdict and soil, with the numbers in force; seed 0. What fails is said
     as a verdict.
     """
@@ -76,10 +76,10 @@ def diagnosed(folder: Path, handed: Handed = lambda *_: None) -> Outcome:
             rig, _ = rig_of(read_all(files), config.load(configuration).settings)
             return decided(rig, handed)
     except (CommandError, ArithmeticError, LookupError, ValueError) as error:
-        return Outcome(f"failed: {type(error).__name__}")
+        return DiagnosisOutcome(f"failed: {type(error).__name__}")
 
 
-def decided(rig: Rig, handed: Handed = lambda *_: None) -> Outcome:
+def decided(rig: Rig, handed: Handed = lambda *_: None) -> DiagnosisOutcome:
     """The method without what explains a decision: that changes none of what counts here."""
     rng = np.random.default_rng(0)
     handed(rig)
@@ -95,7 +95,7 @@ def decided(rig: Rig, handed: Handed = lambda *_: None) -> Outcome:
 
     decision = decide(search)
     tan_phi = averaged_soil(search.problem, decision).get("tan_phi")
-    return Outcome(
+    return DiagnosisOutcome(
         decision.verdict,
         tuple(sorted(decision.best.names)),
         dict(decision.probability),

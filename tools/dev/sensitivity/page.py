@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-from gritd.tools.dev.sensitivity.forks import Case
+from gritd.tools.dev.sensitivity.forks import SensitivityCase
 from gritd.tools.dev.sensitivity.numbers import FIXED, Field, every_field
-from gritd.tools.dev.sensitivity.runs import Runs
+from gritd.tools.dev.sensitivity.runs import DiagnosedRuns
 
 HEAD = """\
 # What each tuned number decides
@@ -37,7 +37,7 @@ def by_hand(text: str) -> str:
 
 
 def page(
-    runs: Runs,
+    runs: DiagnosedRuns,
     only: Collection[str] = (),
     campaigns: Collection[str] = (),
     of: str = "",
@@ -62,7 +62,7 @@ def page(
     return "\n\n".join([*(part.strip() for part in parts if part), _rest(runs)]).strip() + "\n"
 
 
-def _extent(runs: Runs, only: Collection[str], campaigns: Collection[str], of: str) -> str:
+def _extent(runs: DiagnosedRuns, only: Collection[str], campaigns: Collection[str], of: str) -> str:
     """Which campaigns were run, how far, and how long it took."""
     cases = runs.cases(only)
     done, fresh = len(runs.moved), sum(runs.seconds[c.campaign] for c in runs.moved) / 3600.0
@@ -89,7 +89,7 @@ def _extent(runs: Runs, only: Collection[str], campaigns: Collection[str], of: s
     return "\n".join(lines)
 
 
-def _summary(runs: Runs) -> str:
+def _summary(runs: DiagnosedRuns) -> str:
     """Which numbers decide most, and which nothing."""
     flips = Counter(c.field for c, m in runs.moved.items() if m.verdict or m.names)
 
@@ -117,7 +117,7 @@ def _summary(runs: Runs) -> str:
     return "\n".join(lines)
 
 
-def _row(f: Field, runs: Runs) -> str:
+def _row(f: Field, runs: DiagnosedRuns) -> str:
     moved = {case: m for case, m in runs.moved.items() if case.field == f}
 
     cells = [
@@ -132,7 +132,7 @@ def _row(f: Field, runs: Runs) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _which(cases: Iterable[Case]) -> str:
+def _which(cases: Iterable[SensitivityCase]) -> str:
     """How many, and which: `2: nothing ½, ding ×2`."""
     ordered = sorted(cases, key=lambda c: (c.campaign, c.factor))
     named = [f"{c.campaign} {'½' if c.factor < 1.0 else '×2'}" for c in ordered]
@@ -147,7 +147,7 @@ def _number(value: Any) -> str:
     return f"{value:g}"
 
 
-def _rest(runs: Runs) -> str:
+def _rest(runs: DiagnosedRuns) -> str:
     """Numbers that were not run, and why."""
     read = frozenset().union(*runs.read.values())
     rest = [f for f in every_field() if not any(c.field == f for c in runs.moved)]

@@ -14,29 +14,29 @@ from pathlib import Path
 from typing import Any
 
 import gritd
-from gritd.tools.dev.sensitivity.forks import Case, Forks, Reading, read_by
+from gritd.tools.dev.sensitivity.forks import BaseDiagnosis, Forks, SensitivityCase, read_by
 from gritd.tools.dev.sensitivity.numbers import Field, every_field, named
-from gritd.tools.dev.sensitivity.outcome import Diagnose, Moved, Outcome, diagnosed
+from gritd.tools.dev.sensitivity.outcome import Diagnose, DiagnosisOutcome, Moved, diagnosed
 
 HOME = Path(gritd.__file__).parent
 ENGINE = ("estimator", "tools/diagnose")  # what a diagnosis is made of
 
 
 @dataclass
-class Runs:
+class DiagnosedRuns:
     """What has been diagnosed so far, by the campaigns' names; spent: seconds of each case."""
 
-    before: dict[str, Outcome] = field(default_factory=dict)
+    before: dict[str, DiagnosisOutcome] = field(default_factory=dict)
     read: dict[str, frozenset[Field]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
-    moved: dict[Case, Moved] = field(default_factory=dict)
-    spent: dict[Case, float] = field(default_factory=dict)
+    moved: dict[SensitivityCase, Moved] = field(default_factory=dict)
+    spent: dict[SensitivityCase, float] = field(default_factory=dict)
 
-    def cases(self, only: Collection[str] = ()) -> list[Case]:
+    def cases(self, only: Collection[str] = ()) -> list[SensitivityCase]:
         """Those that can move anything, of the numbers that are asked for."""
         asked = [f for f in every_field() if not only or str(f) in only]
         return [
-            Case(campaign, f, factor)
+            SensitivityCase(campaign, f, factor)
             for campaign in self.campaigns()
             for f in asked
             if f in self.read[campaign]
@@ -55,7 +55,7 @@ def run(
     jobs: int = 1,
     minutes: float = math.inf,
     diagnose: Diagnose = diagnosed,
-) -> Iterator[Runs]:
+) -> Iterator[DiagnosedRuns]:
     """Every campaign with every number halved and doubled, as far as the time goes; gives what the
     file holds after each campaign. What it holds already is not run again.
 
@@ -78,7 +78,7 @@ def run(
         yield file.runs()
 
 
-def _left(runs: Runs, campaign: str, only: Collection[str]) -> list[Case]:
+def _left(runs: DiagnosedRuns, campaign: str, only: Collection[str]) -> list[SensitivityCase]:
     return [c for c in runs.cases(only) if c.campaign == campaign and c not in runs.moved]
 
 
@@ -92,7 +92,7 @@ class Kept:
         if (of := self._lines()[0]["engine"]) != engine():
             raise ValueError(f"{path}: made by another version of the engine, {of}")
 
-    def keep_reading(self, campaign: str, reading: Reading) -> None:
+    def keep_reading(self, campaign: str, reading: BaseDiagnosis) -> None:
         self._add(
             {
                 "campaign": campaign,
@@ -102,15 +102,15 @@ class Kept:
             }
         )
 
-    def keep(self, case: Case, outcome: Outcome | None, seconds: float) -> None:
+    def keep(self, case: SensitivityCase, outcome: DiagnosisOutcome | None, seconds: float) -> None:
         """outcome: None where nothing moved. One write, so that children may write at once."""
         after = dataclasses.asdict(outcome) if outcome else None
         line = {"campaign": case.campaign, "number": str(case.field), "factor": case.factor}
         self._add({**line, "after": after, "seconds": round(seconds, 2)})
 
-    def runs(self) -> Runs:
+    def runs(self) -> DiagnosedRuns:
         """All that the file holds."""
-        runs = Runs()
+        runs = DiagnosedRuns()
         for line in self._lines()[1:]:
             if "before" in line:
                 name = line["campaign"]
@@ -138,12 +138,12 @@ class Kept:
             os.close(file)
 
 
-def _outcome(line: Mapping[str, Any]) -> Outcome:
-    return Outcome(**{**line, "accepted": tuple(line["accepted"])})
+def _outcome(line: Mapping[str, Any]) -> DiagnosisOutcome:
+    return DiagnosisOutcome(**{**line, "accepted": tuple(line["accepted"])})
 
 
-def _add_case(runs: Runs, line: Mapping[str, Any]) -> None:
-    case = Case(line["campaign"], named(line["number"]), line["factor"])
+def _add_case(runs: DiagnosedRuns, line: Mapping[str, Any]) -> None:
+    case = SensitivityCase(line["campaign"], named(line["number"]), line["factor"])
     before = runs.before[case.campaign]
     runs.moved[case] = Moved.between(before, _outcome(line["after"]) if line["after"] else before)
     runs.spent[case] = line["seconds"]

@@ -36,7 +36,7 @@ C_CHANGE, TAN_PHI_CHANGE = 0.20, 0.06  # largest, relative
 
 
 @dataclass(frozen=True)
-class Case:
+class SoilChangeCase:
     """One run: the true soil over time, the windows the sensors give, and when the soil changes."""
 
     kind: Kind
@@ -66,7 +66,7 @@ def packaged_rig() -> Settings:
 
 def case(
     settings: Settings, kind: Kind, seed: int, of: plant.PlantKind = "original", rate: float = RATE
-) -> Case:
+) -> SoilChangeCase:
     """The case of a seed: the load varies in every other one, a quarter has no force/torque
     sensor.
     """
@@ -92,7 +92,7 @@ def case(
     at = (np.array([snapshot.evaluated for snapshot in seen]) - START) / NS
     time = np.asarray(motion.time)
     c, tan_phi = (np.interp(at, time, values) for values in (soil.cohesion, soil.tan_phi))
-    return Case(kind, varied, settings, seen, c, tan_phi, begins, settled)
+    return SoilChangeCase(kind, varied, settings, seen, c, tan_phi, begins, settled)
 
 
 def _weighed(

@@ -12,7 +12,7 @@ from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import UPDATED, Flag
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.dev.soil_changes.cases import Case
+from gritd.tools.dev.soil_changes.cases import SoilChangeCase
 
 TOLD = Flag.MISMATCH | Flag.RESET | Flag.CHANGED | Flag.PRIOR
 BACK, STAYS = 15.0, 5.0  # [s] in which σ is to hold again, and for how long at least
@@ -34,7 +34,7 @@ class Track(NamedTuple):
         return worst
 
 
-def followed(case: Case) -> Track:
+def followed(case: SoilChangeCase) -> Track:
     """The filter over a case."""
     tracker = Tracker(case.settings)
     state, rows = tracker.start(), []
@@ -64,7 +64,7 @@ def followed(case: Case) -> Track:
     return Track(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-class Verdict(NamedTuple):
+class FollowedCase(NamedTuple):
     """One case in figures; times in s of driving."""
 
     driven: float  # after the change began
@@ -75,13 +75,13 @@ class Verdict(NamedTuple):
     nees: float  # at the end
 
 
-def judged(case: Case, track: Track) -> Verdict:
+def judged(case: SoilChangeCase, track: Track) -> FollowedCase:
     """How honest σ was from the change on."""
     step = 1.0 / case.settings.rates.update
     after = track.time >= case.begins
     silent = after & ~track.told
 
-    return Verdict(
+    return FollowedCase(
         driven=step * float(np.sum(after)),
         beyond=step * float(np.sum(silent & (track.away > 3.0))),
         far=step * float(np.sum(silent & (track.away > 5.0))),

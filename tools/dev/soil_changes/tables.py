@@ -8,28 +8,28 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.estimate import KPA
-from gritd.tools.dev.soil_changes.cases import KINDS, UNCHANGED, Case, case
-from gritd.tools.dev.soil_changes.followed import BACK, Track, Verdict, begun, followed, judged
+from gritd.tools.dev.soil_changes.cases import KINDS, UNCHANGED, SoilChangeCase, case
+from gritd.tools.dev.soil_changes.followed import BACK, FollowedCase, Track, begun, followed, judged
 from gritd.tools.testbed import plant
 
 
 def verdicts(
     settings: Settings, seeds: Sequence[int], of: plant.PlantKind, rate: float
-) -> Iterator[tuple[Case, Verdict]]:
+) -> Iterator[tuple[SoilChangeCase, FollowedCase]]:
     """Every seed as one of the kinds in turn."""
     for seed in seeds:
         each = case(settings, KINDS[(seed // 4) % len(KINDS)], seed, of, rate)
         yield each, judged(each, followed(each))
 
 
-def table(judgements: Sequence[tuple[Case, Verdict]]) -> str:
+def table(judgements: Sequence[tuple[SoilChangeCase, FollowedCase]]) -> str:
     """One line a kind, and one for all."""
     head = (
         f"{'change':18}{'cases':>6}{'beyond 3σ':>11}{'beyond 5σ':>11}{'flagged':>9}"
         f"{'2σ in 15 s':>12}{'median':>9}{'90 %':>8}{'NEES':>7}"
     )
 
-    groups: list[tuple[str, list[Verdict]]] = [
+    groups: list[tuple[str, list[FollowedCase]]] = [
         (f"{kind}, {'loads vary' if varied else 'one load'}", kept)
         for kind in KINDS
         for varied in (True, False)
@@ -40,7 +40,7 @@ def table(judgements: Sequence[tuple[Case, Verdict]]) -> str:
     return "\n".join([head, *(_line(name, group) for name, group in groups)])
 
 
-def _line(name: str, group: Sequence[Verdict]) -> str:
+def _line(name: str, group: Sequence[FollowedCase]) -> str:
     total = sum(v.driven for v in group)
     back = np.array([v.back for v in group])
     return (
@@ -53,7 +53,7 @@ def _line(name: str, group: Sequence[Verdict]) -> str:
 
 def unchanged(
     settings: Settings, seeds: Sequence[int], of: plant.PlantKind, rate: float
-) -> Iterator[tuple[Case, Track]]:
+) -> Iterator[tuple[SoilChangeCase, Track]]:
     for seed in seeds:
         each = case(settings, "none", seed, of, rate)
         yield each, followed(each)

@@ -83,7 +83,7 @@ PRIOR = {  # mean and standard deviation, SI, from which the true soil is drawn
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldInRun:
     """One condition that is held: slip, rim speed [mm/s], load [N] if not the run's, time [s]."""
 
     slip: float
@@ -93,21 +93,21 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Run:
+class PlannedRun:
     """A run at one load [N], and what is true in it beyond what is true in the campaign."""
 
     load: float
-    held: tuple[Held, ...]
+    held: tuple[HeldInRun, ...]
     effects: tuple[str, ...] = ()
 
     @property
     def schedule(self) -> str:
         """For `gritd simulate`, with a rest before and after."""
-        rest = Held(self.held[0].slip, 0.0, self.held[0].load, 2.0)
+        rest = HeldInRun(self.held[0].slip, 0.0, self.held[0].load, 2.0)
         lines = (self._segment(held) for held in (rest, *self.held, rest))
         return "\n".join(["ramp: 500 ms", "segments:", *lines, ""])
 
-    def _segment(self, held: Held) -> str:
+    def _segment(self, held: HeldInRun) -> str:
         load = self.load if held.load is None else held.load
         parts = f"duration: {held.seconds:g} s, load: {load:g} N, slip: {held.slip:g}"
         return f"  - {{{parts}, speed: {held.speed:g} mm/s}}"
@@ -121,7 +121,7 @@ class Simulated:
     """
 
     name: str
-    runs: tuple[Run, ...]
+    runs: tuple[PlannedRun, ...]
     effects: tuple[str, ...] = ()
     world: Edits = ()
     told: Edits = ()
@@ -129,24 +129,28 @@ class Simulated:
     linearised: bool = True
 
 
-SWEPT = (Held(0.1), Held(0.3), Held(0.5, 30.0))
-FINE = (Held(0.1), Held(0.25), Held(0.4), Held(0.55), Held(0.2, 40.0))
-LONG = (Held(0.2, seconds=12.0), Held(0.4, seconds=12.0), Held(0.2, 30.0, seconds=8.0))
-STEADY = (Held(0.25, seconds=18.0),)
-LIFTED = Held(0.1, load=0.0, seconds=4.0)
-MIXED = tuple(Held(slip, load=load) for load in (40.0, 70.0, 100.0) for slip in (0.15, 0.45))
-BOTH_WAYS = (*SWEPT, Held(0.3, -20.0))
-CREEPING = (Held(0.2, 8.0, seconds=6.0),)
+SWEPT = (HeldInRun(0.1), HeldInRun(0.3), HeldInRun(0.5, 30.0))
+FINE = (HeldInRun(0.1), HeldInRun(0.25), HeldInRun(0.4), HeldInRun(0.55), HeldInRun(0.2, 40.0))
+LONG = (
+    HeldInRun(0.2, seconds=12.0),
+    HeldInRun(0.4, seconds=12.0),
+    HeldInRun(0.2, 30.0, seconds=8.0),
+)
+STEADY = (HeldInRun(0.25, seconds=18.0),)
+LIFTED = HeldInRun(0.1, load=0.0, seconds=4.0)
+MIXED = tuple(HeldInRun(slip, load=load) for load in (40.0, 70.0, 100.0) for slip in (0.15, 0.45))
+BOTH_WAYS = (*SWEPT, HeldInRun(0.3, -20.0))
+CREEPING = (HeldInRun(0.2, 8.0, seconds=6.0),)
 
-TWO = (Run(40.0, SWEPT), Run(80.0, SWEPT))
-THREE = (Run(40.0, SWEPT), Run(70.0, SWEPT), Run(100.0, SWEPT))
+TWO = (PlannedRun(40.0, SWEPT), PlannedRun(80.0, SWEPT))
+THREE = (PlannedRun(40.0, SWEPT), PlannedRun(70.0, SWEPT), PlannedRun(100.0, SWEPT))
 BETWEEN = (
-    Run(50.0, FINE),
-    Run(90.0, FINE, ("coulomb_friction.loss=0.3",)),
-    Run(70.0, FINE, ("force_crosstalk.from_load=0.03",)),
+    PlannedRun(50.0, FINE),
+    PlannedRun(90.0, FINE, ("coulomb_friction.loss=0.3",)),
+    PlannedRun(70.0, FINE, ("force_crosstalk.from_load=0.03",)),
 )
 REPLICATES = tuple(
-    Run(60.0, STEADY, (f"sinkage_datum.offset={offset}",)) for offset in (4e-4, -5e-4, 1e-4)
+    PlannedRun(60.0, STEADY, (f"sinkage_datum.offset={offset}",)) for offset in (4e-4, -5e-4, 1e-4)
 )
 UNLISTED = (
     "empirical_law.pull_slip_squared=-8",
@@ -174,28 +178,32 @@ SIMULATED = (
     Simulated("slip-sinkage", THREE, ("slip_sinkage.growth=0.15",)),
     Simulated(
         "soil-patch",
-        (Run(50.0, FINE), Run(90.0, FINE)),
+        (PlannedRun(50.0, FINE), PlannedRun(90.0, FINE)),
         ("soil_patch.cohesion_change=0.6", "soil_patch.centre=0.2", "soil_patch.length=0.12"),
     ),
     Simulated("sinkage-datum", TWO, ("sinkage_datum.offset=0.003",)),
     Simulated("bed-slope", THREE, ("bed_slope.angle=0.03",)),
     Simulated(
         "motor-heating-no-wrench",
-        (Run(60.0, LONG), Run(100.0, LONG)),
+        (PlannedRun(60.0, LONG), PlannedRun(100.0, LONG)),
         ("motor_heating.fall=0.08", "motor_heating.duration=20"),
         wrench=False,
     ),
     Simulated("rear-contact-unlinearised", THREE, ("rear_contact.ratio=0.3",), linearised=False),
     Simulated(
         "two-effects-both-ways",
-        (Run(40.0, BOTH_WAYS), Run(80.0, BOTH_WAYS)),
+        (PlannedRun(40.0, BOTH_WAYS), PlannedRun(80.0, BOTH_WAYS)),
         ("coulomb_friction.loss=0.3", "slip_sinkage.growth=0.2"),
     ),
     Simulated(
-        "single-run-load-unstated", (Run(70.0, (*MIXED, LIFTED)),), ("pulley_slip.share=0.05",)
+        "single-run-load-unstated",
+        (PlannedRun(70.0, (*MIXED, LIFTED)),),
+        ("pulley_slip.share=0.05",),
     ),
-    Simulated("single-load", (Run(70.0, CREEPING),), world=NOISY_VOLTS, told=WIDE, wrench=False),
-    Simulated("replicates-unlisted", (*REPLICATES, Run(90.0, SWEPT)), UNLISTED),
+    Simulated(
+        "single-load", (PlannedRun(70.0, CREEPING),), world=NOISY_VOLTS, told=WIDE, wrench=False
+    ),
+    Simulated("replicates-unlisted", (*REPLICATES, PlannedRun(90.0, SWEPT)), UNLISTED),
     Simulated("between-runs", BETWEEN),
 )
 

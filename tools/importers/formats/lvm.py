@@ -25,7 +25,7 @@ Fields = dict[str, list[str]]
 
 
 @dataclass
-class Segment:
+class LvmSegment:
     """The fields of a segment's header, the names of its columns, and its rows."""
 
     header: Fields
@@ -65,17 +65,17 @@ def _common(path: Path, text: Iterator[str]) -> tuple[Fields, str]:
     raise RigFileError(f"{path}: found no {ENDS}; expected it below the header")
 
 
-def _segments(path: Path, text: Iterator[str], separator: str) -> Iterator[Segment]:
+def _segments(path: Path, text: Iterator[str], separator: str) -> Iterator[LvmSegment]:
     """The segments, each of a header of its own. A line that is none of its rows is left out."""
     header: Fields = {}
-    segment, special = Segment({}), False
+    segment, special = LvmSegment({}), False
     for line in text:
         cells = [cell.strip() for cell in line.rstrip("\r\n").split(separator)]
         if cells[0] in (SPECIAL, NO_SPECIAL):
             special = cells[0] == SPECIAL
         elif cells[0] == ENDS:
             yield segment
-            segment, header = Segment(header), {}
+            segment, header = LvmSegment(header), {}
         elif cells[0] == X or (not segment.names and X in cells):
             segment.names = cells
         elif not special and cells[0] and not _is_row(cells):
@@ -95,7 +95,7 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 
 def _tables(
-    path: Path, common: Fields, segments: Sequence[Segment], decimal: str, wanted: Wanted
+    path: Path, common: Fields, segments: Sequence[LvmSegment], decimal: str, wanted: Wanted
 ) -> Iterator[SeriesTable]:
     names, kind = segments[0].names, common.get("X_Columns", ["One"])[0].lower()
     blocks = [_numbers(path, each, decimal) for each in segments if each.names == names]
@@ -140,7 +140,7 @@ def _own_clocks(
             yield table(path, {name: whole[known, at]}, units=units, clock=clock)
 
 
-def _numbers(path: Path, segment: Segment, decimal: str) -> Array:
+def _numbers(path: Path, segment: LvmSegment, decimal: str) -> Array:
     """The samples (n, columns), NaN where there is none. Raises RigFileError."""
     width = len(segment.names)
     rows = [(row + [""] * width)[:width] for row in segment.rows]

@@ -22,7 +22,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers.files import Array, RigFileError, find, numbers, read_table
-from gritd.tools.importers.recording import Stream, stamps, write
+from gritd.tools.importers.recording import ChannelReadings, stamps, write
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import START
 
@@ -82,7 +82,7 @@ def read_log(path: Path) -> dict[str, Array]:
 
 def _streams(
     log: Mapping[str, Array], settings: Settings, start: int, rng: np.random.Generator
-) -> list[Stream]:
+) -> list[ChannelReadings]:
     """What the configured sensors make of a log."""
     channels, wrench, at = settings.channels, settings.wrench, stamps(start, log["t"])
     assert wrench is not None
@@ -101,14 +101,16 @@ def _streams(
         forces[:, axis] = values + sigma * rng.standard_normal(at.size)
 
     streams = [
-        Stream(name, at, np.round(_raw(values, channels[name].calibration)).astype(np.int64))
+        ChannelReadings(
+            name, at, np.round(_raw(values, channels[name].calibration)).astype(np.int64)
+        )
         for name, values in encoders.items()
     ]
     for name, values in analogue.items():
         channel = channels[name]
         read = _raw(values, channel.calibration) + channel.noise * rng.standard_normal(at.size)
-        streams.append(Stream(name, at, read))
-    return [*streams, Stream("wrench", at, forces)]
+        streams.append(ChannelReadings(name, at, read))
+    return [*streams, ChannelReadings("wrench", at, forces)]
 
 
 def _raw(values: Array, calibration: Calibration) -> Array:

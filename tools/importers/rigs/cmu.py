@@ -33,7 +33,14 @@ from gritd.tools.importers.files import (
     read_text,
 )
 from gritd.tools.importers.formats.mat import struct_lists
-from gritd.tools.importers.recording import NS, Stream, configuration, counts, stamps, write
+from gritd.tools.importers.recording import (
+    NS,
+    ChannelReadings,
+    configuration,
+    counts,
+    stamps,
+    write,
+)
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
 
@@ -272,9 +279,9 @@ def _import_log(
     times = stamps(round(rows[0, 6] * 1e3) * (NS // 1000), seconds)
 
     logged = [
-        Stream("wheel_encoder", times, counts(seconds, rows[:, 2] * 1e-3, COUNT)),
-        Stream("carriage_encoder", times, counts(seconds, rows[:, 1] * 1e-3, COUNT)),
-        Stream("sinkage_pot", times, rows[:, 4] - rows[0, 4]),
+        ChannelReadings("wheel_encoder", times, counts(seconds, rows[:, 2] * 1e-3, COUNT)),
+        ChannelReadings("carriage_encoder", times, counts(seconds, rows[:, 1] * 1e-3, COUNT)),
+        ChannelReadings("sinkage_pot", times, rows[:, 4] - rows[0, 4]),
     ]
 
     plain = path.name.removesuffix(".gz")

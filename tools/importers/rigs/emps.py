@@ -20,7 +20,7 @@ from scipy.io import loadmat, whosmat
 from gritd.estimator.limits import limits, raised
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers.files import LARGEST, Array, RigFileError, find, increasing
-from gritd.tools.importers.recording import Stream, configuration, stamps, write
+from gritd.tools.importers.recording import ChannelReadings, configuration, stamps, write
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import START
 
@@ -102,9 +102,9 @@ def _check_size(path: Path) -> None:
             )
 
 
-def _streams(log: dict[str, Array]) -> list[Stream]:
+def _streams(log: dict[str, Array]) -> list[ChannelReadings]:
     times = stamps(START, log["t"])
     return [
-        Stream("wheel_encoder", times, np.round(log["qm"] / COUNT).astype(np.int64)),
-        Stream("motor_shunt", times, log["vir"]),
+        ChannelReadings("wheel_encoder", times, np.round(log["qm"] / COUNT).astype(np.int64)),
+        ChannelReadings("motor_shunt", times, log["vir"]),
     ]

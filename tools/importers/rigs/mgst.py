@@ -22,7 +22,14 @@ from scipy.ndimage import gaussian_filter1d
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.cli.command import number
 from gritd.tools.importers.files import Array, RigFileError, find, increasing, numbers, read_table
-from gritd.tools.importers.recording import UNKNOWN, Stream, configuration, counts, stamps, write
+from gritd.tools.importers.recording import (
+    UNKNOWN,
+    ChannelReadings,
+    configuration,
+    counts,
+    stamps,
+    write,
+)
 from gritd.tools.importers.registry import Tell
 
 NAME = "mgst"
@@ -52,7 +59,7 @@ CONCEALABLE = ("torque", "drawbar_pull", "lateral_force", "motor_shunt", "sinkag
 
 
 @dataclass(frozen=True)
-class Rig:
+class RigLog:
     """The rig's log: arrays of shape (n,), the first instant at t = 0."""
 
     start: int  # [ns since the epoch] the log's time of day, taken as UTC
@@ -65,7 +72,7 @@ class Rig:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class WrenchLog:
     """The force/torque log: arrays of shape (n,), t = 0 at its own first sample."""
 
     t: Array  # [s]
@@ -76,11 +83,11 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Trial:
+class MgstTrial:
     name: str
     slip: int  # nominal [%]
-    rig: Rig
-    sensor: Sensor
+    rig: RigLog
+    sensor: WrenchLog
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -146,7 +153,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     return written
 
 
-def _wheel(trials: Sequence[Trial]) -> dict[str, str]:
+def _wheel(trials: Sequence[MgstTrial]) -> dict[str, str]:
     """Radius of the one wheel of all trials, and what follows. Raises RigFileError."""
     radius = trials[0].rig.radius
     other = next((trial for trial in trials if trial.rig.radius != radius), None)
@@ -187,20 +194,20 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
     return [(file, sensors[match[2]], match) for file, match in rigs]
 
 
-def read_trial(rig: Path, sensor: Path, name: re.Match[str]) -> Trial:
+def read_trial(rig: Path, sensor: Path, name: re.Match[str]) -> MgstTrial:
     """Both logs of a trial. Raises RigFileError."""
-    return Trial(
+    return MgstTrial(
         f"mgst-{name[3]}-{name[2]}", int(name[3]), _read_rig(rig, name[1]), _read_sensor(sensor)
     )
 
 
-def _read_rig(path: Path, date: str) -> Rig:
+def _read_rig(path: Path, date: str) -> RigLog:
     table = read_table(path, RIG_COLUMNS)
     clock = increasing(path, "timestamp", _times(path, table["timestamp"]))
     counted = numbers(path, table, "sinkage")
     rim_speed = numbers(path, table, "maxon_velmes") * 1e-3
 
-    return Rig(
+    return RigLog(
         start=_midnight(path, date) + round(clock[0] * 1e9),
         t=clock - clock[0],
         current=numbers(path, table, "maxon_current"),
@@ -230,10 +237,10 @@ def _radius(path: Path, rim_speed: Array) -> float:
     return known[0]
 
 
-def _read_sensor(path: Path) -> Sensor:
+def _read_sensor(path: Path) -> WrenchLog:
     table = read_table(path, SENSOR_COLUMNS)
     raw = numbers(path, table, "dp_raw")
-    return Sensor(
+    return WrenchLog(
         t=increasing(path, "Timestamp", _times(path, table["Timestamp"])),
         drawbar_pull=numbers(path, table, "dp"),
         drawbar_pull_raw=raw,
@@ -267,7 +274,7 @@ def _midnight(path: Path, date: str) -> int:
 # --- the two clocks ---
 
 
-def find_lag(trial: Trial) -> tuple[float, float]:
+def find_lag(trial: MgstTrial) -> tuple[float, float]:
     """Lag [s] of the force/torque log's zero behind the rig's, and the correlation there.
 
     Where motor torque (rig) and axle torque (sensor) agree best in steady driving, over 0.2 to 1 s:
@@ -304,8 +311,8 @@ def _fluctuation(values: Array) -> Array:
 
 
 def _streams(
-    trial: Trial, lag: float, begin: float, pull: str, concealed: set[str]
-) -> list[Stream]:
+    trial: MgstTrial, lag: float, begin: float, pull: str, concealed: set[str]
+) -> list[ChannelReadings]:
     """The channels from `begin` (0 is the start of the wheel, a little before the first force) to
     where a log ends.
     """
@@ -322,15 +329,15 @@ def _streams(
         "motor_shunt": rig.current,
     }
 
-    streams = [Stream(name, times, values[shared]) for name, values in logged.items()]
+    streams = [ChannelReadings(name, times, values[shared]) for name, values in logged.items()]
     inside = (sensor.t + lag >= begin) & (sensor.t + lag <= rig.t[-1])
     sensed = stamps(rig.start, sensor.t + lag)[inside]
-    streams.append(Stream("wrench", sensed, _wrench(sensor, pull, concealed)[inside]))
+    streams.append(ChannelReadings("wrench", sensed, _wrench(sensor, pull, concealed)[inside]))
 
     return [stream for stream in streams if stream.channel not in concealed]
 
 
-def _wrench(sensor: Sensor, pull: str, concealed: set[str]) -> Array:
+def _wrench(sensor: WrenchLog, pull: str, concealed: set[str]) -> Array:
     """Six axes, shape (n, 6); an axis that is not measured, or is concealed, is zero."""
     wrench = np.zeros((len(sensor.t), 6))
     if "drawbar_pull" not in concealed:
@@ -343,7 +350,7 @@ def _wrench(sensor: Sensor, pull: str, concealed: set[str]) -> Array:
     return wrench
 
 
-def _info(trial: Trial, lag: float, pull: str, concealed: list[str]) -> RunInfo:
+def _info(trial: MgstTrial, lag: float, pull: str, concealed: list[str]) -> RunInfo:
     hidden = ", ".join(sorted(set(concealed))) or "nothing"
     notes = (
         f"slip {trial.slip} %; drawbar pull {pull}; sensor log lags {lag:.2f} s; concealed: "
@@ -362,7 +369,7 @@ HEADER = (
 )
 
 
-def _row(trial: Trial, lag: float, correlation: float) -> str:
+def _row(trial: MgstTrial, lag: float, correlation: float) -> str:
     rig, sensor = trial.rig, trial.sensor
     end = lag + sensor.t[-1]
     driving = (rig.t > STEADY) & (rig.t < end)

@@ -8,7 +8,7 @@ from gritd.estimator.config.settings import Uncertain
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class CalibratedChannel:
     """One channel, or one axis of the wrench: physical = raw · scale + offset, SI."""
 
     scale: Uncertain

@@ -12,7 +12,7 @@ from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable, Told
 from gritd.tools.importers.series.mapping import MEASURED, SeriesMap
 from gritd.tools.importers.series.runs import EPOCH, SeriesRun, info_of, of_table, resampled
-from gritd.tools.importers.series.sources import Part, RunFiles, parts
+from gritd.tools.importers.series.sources import RunFiles, SourcePart, parts
 from gritd.tools.importers.series.times import NS, Nanoseconds
 
 SLOW = "motor_temperature"  # a channel that may be slow: the filter does not wait for it
@@ -30,7 +30,7 @@ def runs_of(files: RunFiles, mapped: SeriesMap, told: Sequence[Told]) -> Iterato
     yield from runs_of_parts(found, mapped, files.name)
 
 
-def runs_of_parts(found: Sequence[Part], mapped: SeriesMap, name: str) -> Iterator[SeriesRun]:
+def runs_of_parts(found: Sequence[SourcePart], mapped: SeriesMap, name: str) -> Iterator[SeriesRun]:
     """The same of files that were read. Raises RigFileError."""
     if len(found) == 1:
         yield from of_table(found[0].table, found[0].mapped, name)
@@ -44,7 +44,7 @@ def runs_of_parts(found: Sequence[Part], mapped: SeriesMap, name: str) -> Iterat
 
 
 def _aligned(
-    each: Sequence[Sequence[SeriesRun]], found: Sequence[Part], name: str
+    each: Sequence[Sequence[SeriesRun]], found: Sequence[SourcePart], name: str
 ) -> Iterator[tuple[SeriesRun, ...]]:
     """The runs of all clocks that are one. Raises RigFileError."""
     for runs, part in zip(each, found, strict=True):
@@ -56,11 +56,13 @@ def _aligned(
     yield from zip(*each, strict=True)
 
 
-def _named(part: Part) -> str:
+def _named(part: SourcePart) -> str:
     return f"{part.table.path.name} ({list(part.table.columns)[-1]})"
 
 
-def _together(runs: Sequence[SeriesRun], found: Sequence[Part], mapped: SeriesMap) -> SeriesRun:
+def _together(
+    runs: Sequence[SeriesRun], found: Sequence[SourcePart], mapped: SeriesMap
+) -> SeriesRun:
     """One run with the rows of all: a row of one clock has no numbers in the columns of others.
     Raises RigFileError.
     """
@@ -101,7 +103,7 @@ def _at(column: Column, rows: Nanoseconds, size: int) -> Column:
     return Column(numbers, None, column.resolution)
 
 
-def _check_overlap(times: Sequence[Nanoseconds], found: Sequence[Part]) -> None:
+def _check_overlap(times: Sequence[Nanoseconds], found: Sequence[SourcePart]) -> None:
     """Raises RigFileError where clocks have no time in common."""
     last = max(range(len(times)), key=lambda at: int(times[at][0]))
     first = min(range(len(times)), key=lambda at: int(times[at][-1]))

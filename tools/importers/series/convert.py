@@ -18,9 +18,9 @@ from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.messages.readings import WRENCH_FIELDS
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import Array, RigFileError
-from gritd.tools.importers.recording import UNKNOWN, Stream, stamps
+from gritd.tools.importers.recording import UNKNOWN, ChannelReadings, stamps
 from gritd.tools.importers.series import encoders
-from gritd.tools.importers.series.calibrated import Calibrated
+from gritd.tools.importers.series.calibrated import CalibratedChannel
 from gritd.tools.importers.series.mapping import AS_CONFIGURED, Mapped, SeriesMap
 from gritd.tools.importers.series.noise import scatter
 from gritd.tools.importers.series.runs import SeriesRun
@@ -44,10 +44,10 @@ class Imported:
     intervals: time between two readings of each channel [s].
     """
 
-    streams: tuple[tuple[Stream, ...], ...]
-    channels: dict[str, Calibrated]
+    streams: tuple[tuple[ChannelReadings, ...], ...]
+    channels: dict[str, CalibratedChannel]
     configured: dict[str, float]
-    axes: dict[str, Calibrated]
+    axes: dict[str, CalibratedChannel]
     intervals: dict[str, float]
 
 
@@ -164,7 +164,7 @@ def _calibrated(
     noise: float,
     interval: float,
     settings: Settings,
-) -> Calibrated:
+) -> CalibratedChannel:
     """Of one channel: an encoder's counts, or a column's numbers as volts."""
     if quantum is not None:
         return encoders.calibrated(column, quantum, noise, interval, settings)
@@ -172,7 +172,7 @@ def _calibrated(
     torque = column.channel == "motor_torque"
     constant = settings.drive.torque_constant.value if torque else 1.0
     scale, factor, offset = column.per_unit / constant, column.factor, column.offset
-    return Calibrated(
+    return CalibratedChannel(
         Uncertain(scale * factor.value, scale * factor.sigma),
         Uncertain(offset.value / constant, offset.sigma / constant),
         noise,
@@ -181,7 +181,7 @@ def _calibrated(
 
 def _axes(
     runs: Sequence[SeriesRun], mapped: SeriesMap, settings: Settings
-) -> dict[str, Calibrated]:
+) -> dict[str, CalibratedChannel]:
     """The wrench's axes, where any is measured. A load that is not is the weights of the run; any
     other that is not carries no information.
     """
@@ -192,12 +192,12 @@ def _axes(
     weights = Uncertain(0.0, settings.load.nominal.sigma)
     absent = {axis: weights if axis == "load" else Uncertain(0.0, UNKNOWN) for axis in AXES}
     calibrations = {
-        axis: Calibrated(Uncertain(1.0), offset, 0.0) for axis, offset in absent.items()
+        axis: CalibratedChannel(Uncertain(1.0), offset, 0.0) for axis, offset in absent.items()
     }
     for axis, name in named.items():
         column = mapped.columns[name]
         noise = _noise(runs, mapped, name) * column.per_unit
-        calibrations[axis] = Calibrated(column.factor, column.offset, noise)
+        calibrations[axis] = CalibratedChannel(column.factor, column.offset, noise)
     return calibrations
 
 
@@ -211,7 +211,7 @@ def _streams(
     used: dict[str, str],
     quanta: dict[str, float],
     settings: Settings,
-) -> list[Stream]:
+) -> list[ChannelReadings]:
     """The readings of one run; where a cell is empty there is none."""
     at = stamps(start, run.seconds)
     streams = []
@@ -222,7 +222,7 @@ def _streams(
         if channel in quanta:
             seconds = _chosen(run.seconds, known)
             values = encoders.counted(seconds, values, column, quanta[channel])
-        streams.append(Stream(channel, stamped, values))
+        streams.append(ChannelReadings(channel, stamped, values))
 
     if any(mapped.named(axis) for axis in AXES):
         weights = run.info.nominal_load or settings.load.nominal.value
@@ -235,7 +235,9 @@ def _chosen(rows: NDArray[Any], known: NDArray[np.bool_]) -> NDArray[Any]:
     return rows if np.all(known) else rows[known]
 
 
-def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float) -> Stream:
+def _wrench(
+    run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float
+) -> ChannelReadings:
     """Rows in which every measured axis has a number; N and N·m as the file's units say."""
     measured = {field: name for axis, field in AXES.items() if (name := mapped.named(axis))}
     columns = [run.table.column(name).numbers for name in measured.values()]
@@ -249,7 +251,7 @@ def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: f
         six[:, WRENCH_FIELDS.index(field)] = numbers * mapped.columns[name].per_unit
         known &= np.isfinite(numbers)
 
-    return Stream("wrench", _chosen(at, known), _chosen(six, known))
+    return ChannelReadings("wrench", _chosen(at, known), _chosen(six, known))
 
 
 def _of_one_clock(seconds: Array, columns: list[Array]) -> list[Array]:

@@ -16,7 +16,14 @@ from gritd.tools.importers.series.cells import OddCell
 from gritd.tools.importers.series.columns import SeriesTable, Told, no_column, told_rows
 from gritd.tools.importers.series.dialect import Layout, is_value, joined, layout, split
 from gritd.tools.importers.series.mapping import Mapped
-from gritd.tools.importers.series.text_columns import Builder, Growing, Loose, Numbers, Times, Words
+from gritd.tools.importers.series.text_columns import (
+    Builder,
+    Growing,
+    Loose,
+    NumberColumn,
+    Times,
+    Words,
+)
 from gritd.tools.importers.series.text_file import TextFile, text_file
 from gritd.tools.importers.series.times import TimeFormatError, is_gap
 
@@ -95,7 +102,7 @@ def _builders(
                 made[name, at] = Words()
             else:
                 timed = column.channel in ("time", "date")
-                numbers = Numbers(first[at], form.separator != ",")
+                numbers = NumberColumn(first[at], form.separator != ",")
                 made[name, at] = Times(column) if timed else numbers
     return made
 
@@ -327,7 +334,7 @@ class _Table:
 
     def _keep(self, pieces: dict[int, Any], numbers: NDArray[np.int64]) -> None:
         for (name, at), made in self._columns.items():
-            if isinstance(made, Numbers) and np.any(far := np.abs(pieces[at]) > LARGEST):
+            if isinstance(made, NumberColumn) and np.any(far := np.abs(pieces[at]) > LARGEST):
                 row = int(numbers[np.argmax(far)])
                 raise RigFileError(
                     f"{self._path}: row {row}: {name[:40]}: expected a number up to {LARGEST:g}"

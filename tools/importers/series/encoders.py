@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.tools.importers.recording import counts
-from gritd.tools.importers.series.calibrated import Calibrated
+from gritd.tools.importers.series.calibrated import CalibratedChannel
 from gritd.tools.importers.series.mapping import Mapped
 from gritd.tools.importers.series.noise import spacing
 from gritd.tools.importers.series.runs import SeriesRun
@@ -46,7 +46,7 @@ def quantum(runs: Sequence[SeriesRun], name: str, column: Mapped) -> float:
 
 def calibrated(
     column: Mapped, quantum: float, noise: float, interval: float, settings: Settings
-) -> Calibrated:
+) -> CalibratedChannel:
     """Angle per count, and noise in counts. `noise` is of one number of the column.
 
     That of a speed becomes the noise of an angle whose slope over the filter's window of N readings
@@ -58,7 +58,7 @@ def calibrated(
         window = max(1.0 / (settings.rates.update * interval), 1.0)
         noise *= interval * window / 12.0**0.5
 
-    return Calibrated(
+    return CalibratedChannel(
         Uncertain(scale * column.factor.value, scale * column.factor.sigma),
         Uncertain(column.offset.value / radius, column.offset.sigma / radius),
         max(noise / quantum, LEAST),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gritd.estimator.config import units
-from gritd.estimator.config.kinds import Choice, Integer, Quantity, Text
+from gritd.estimator.config.kinds import Choice, Integer, NumberWithUnit, Text
 from gritd.estimator.config.schema import (
     ABSENT,
     NEEDED,
@@ -182,7 +182,7 @@ def spelled(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class Columns:
+class ColumnMapping:
     """A mapping of columns, by any names."""
 
     expected: str = "a mapping of columns"
@@ -229,7 +229,7 @@ class Files:
 
 
 @dataclass(frozen=True)
-class Runs:
+class RunTable:
     """What is said of each run, by its file's name or by what the column of runs holds."""
 
     expected: str = "a mapping of runs"
@@ -241,22 +241,22 @@ class Runs:
 
 
 RUN = {
-    "load": Key(Quantity("N", above=0), "weights", ABSENT),
+    "load": Key(NumberWithUnit("N", above=0), "weights", ABSENT),
     "pass": Key(Integer(1, 1000), "number of the pass", "1"),
-    "start": Key(Quantity("m"), "starting position", "0 m"),
+    "start": Key(NumberWithUnit("m"), "starting position", "0 m"),
     "operator": Key(Text(), "who ran it", "''"),
     "notes": Key(Text(), "one line", "''"),
 }
 WHEEL = {
-    "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
-    "width": Key(Quantity("m", above=0, high=5), "wheel width b"),
+    "radius": Key(NumberWithUnit("m", above=0, high=5), "wheel radius r"),
+    "width": Key(NumberWithUnit("m", above=0, high=5), "wheel width b"),
 }
 
 
 OF_FILE = {
-    "columns": Key(Columns(), "the columns that are used"),
-    "rate": Key(Quantity("Hz", above=0), "of the rows, where no time tells it", ABSENT),
-    "shift": Key(Quantity("s"), "is added to the times", "0 s"),
+    "columns": Key(ColumnMapping(), "the columns that are used"),
+    "rate": Key(NumberWithUnit("Hz", above=0), "of the rows, where no time tells it", ABSENT),
+    "shift": Key(NumberWithUnit("s"), "is added to the times", "0 s"),
 }
 
 
@@ -273,7 +273,9 @@ def _channels() -> dict[str, Section]:
         for name, (si, _) in MEASURED.items()
     }
     for name in WRAPPING:
-        wraps = Key(Quantity(MEASURED[name][0], above=0), "after which it begins anew", ABSENT)
+        wraps = Key(
+            NumberWithUnit(MEASURED[name][0], above=0), "after which it begins anew", ABSENT
+        )
         measured[name] = Section(dict(measured[name].keys) | {"wraps": wraps}, _mapped)
     run = Section(_choice("run"), Mapped)
     order = Key(Choice(ORDERS), "of a date in numbers", ABSENT)
@@ -302,8 +304,8 @@ def _measured(name: str, si: str) -> Section:
         "unit": Key(UnitOf(si), "unit of the column"),
         "factor": Key(uncertain(""), "multiplies the column; -1 turns its sign", "1.0"),
         "offset": Key(uncertain(difference), "is added", f"0 {difference}"),
-        "noise": Key(Quantity(difference, above=0), "of one reading; else estimated", ABSENT),
-        "rate": Key(Quantity("Hz", above=0), "of its rows, where they have no time", ABSENT),
+        "noise": Key(NumberWithUnit(difference, above=0), "of one reading; else estimated", ABSENT),
+        "rate": Key(NumberWithUnit("Hz", above=0), "of its rows, where they have no time", ABSENT),
     }
     return Section(_choice(name) | keys, _mapped)
 
@@ -344,16 +346,16 @@ def _whole(
 
 TABLE = Section(
     {
-        "columns": Key(Columns(), "the columns that are used", ABSENT),
+        "columns": Key(ColumnMapping(), "the columns that are used", ABSENT),
         "rate": OF_FILE["rate"],
         "files": Key(Files(), "several files of each run, with their columns", ABSENT),
-        "resample": Key(Quantity("Hz", above=0), "means over as many rows", ABSENT),
+        "resample": Key(NumberWithUnit("Hz", above=0), "means over as many rows", ABSENT),
         "wheel": Key(Section(WHEEL, dict), "the wheel, without --config", ABSENT),
         "torque_constant": Key(uncertain("N*m/A", above=0), "of the drive", ABSENT),
-        "load": Key(Quantity("N", above=0), "weights of every run", ABSENT),
+        "load": Key(NumberWithUnit("N", above=0), "weights of every run", ABSENT),
         "operator": Key(Text(), "who made the runs", "''"),
         "notes": Key(Text(), "of every run that has none of its own", "''"),
-        "runs": Key(Runs(), "what is known of each run", "{}"),
+        "runs": Key(RunTable(), "what is known of each run", "{}"),
     },
     _whole,
 )

@@ -29,7 +29,7 @@ AXLE, OTHER_AXES = {"ty", "my", "y"}, {"tx", "mx", "tz", "mz", "x", "z"}
 
 
 @dataclass(frozen=True)
-class Unit:
+class ColumnUnit:
     """As gritd writes it, and what the column is multiplied by for it."""
 
     name: str
@@ -50,7 +50,7 @@ class Meaning:
     asks: str = ""
 
 
-def unit_of(table: SeriesTable, name: str) -> Unit | None:
+def unit_of(table: SeriesTable, name: str) -> ColumnUnit | None:
     """Of the row of units, in brackets, or at the end of the name; None where nothing is told."""
     plain = MESSAGE.sub("", name)
     rate, ending = RATE.search(plain), ENDING.search(plain)
@@ -63,11 +63,11 @@ def unit_of(table: SeriesTable, name: str) -> Unit | None:
     )
     for text in texts:
         if text and (known := names.unit_of(text)) is not None:
-            return Unit(*known)
+            return ColumnUnit(*known)
     return None
 
 
-def fits(channel: str, unit: Unit | None) -> bool:
+def fits(channel: str, unit: ColumnUnit | None) -> bool:
     """Whether a unit is one of a channel; none is of every one."""
     if unit is None:
         return True
@@ -75,7 +75,7 @@ def fits(channel: str, unit: Unit | None) -> bool:
     return wanted is not None and units.unit(unit.name).dimension == units.unit(wanted).dimension
 
 
-def meaning_of(name: str, unit: Unit | None) -> Meaning | None:
+def meaning_of(name: str, unit: ColumnUnit | None) -> Meaning | None:
     """The channel that a name speaks of, with a unit of its kind."""
     plain = names.IN_BRACKETS.sub(_kept, name).strip()
     if plain in CAPITAL and fits(CAPITAL[plain], unit):
@@ -93,7 +93,7 @@ def meaning_of(name: str, unit: Unit | None) -> Meaning | None:
     return None
 
 
-def meaning_in(table: SeriesTable, name: str, unit: Unit | None) -> Meaning | None:
+def meaning_in(table: SeriesTable, name: str, unit: ColumnUnit | None) -> Meaning | None:
     """Of a column's name without its group, else with it; with it, where that alone says whose
     motion it is.
     """
@@ -112,7 +112,7 @@ def _kept(bracket: re.Match[str]) -> str:
     return " " if names.unit_of(bracket[1]) else f" {bracket[1]} "
 
 
-def _time(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None:
+def _time(means: set[str], words: set[str], unit: ColumnUnit | None) -> Meaning | None:
     if "time" in means:
         return Meaning("time") if means <= {"time", "number", "date"} else Meaning("time", 1)
     if "date" in means:
@@ -122,7 +122,7 @@ def _time(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None
     return Meaning("motor_temperature") if "temperature" in means else None
 
 
-def _force(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None:
+def _force(means: set[str], words: set[str], unit: ColumnUnit | None) -> Meaning | None:
     """Pull, load, lateral force; by the axis of a force, too."""
     if "torque" in means:
         return None
@@ -142,7 +142,7 @@ def _force(means: set[str], words: set[str], unit: Unit | None) -> Meaning | Non
     return Meaning("force?", 0, "which force it is") if "effort" not in means else None
 
 
-def _drive(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None:
+def _drive(means: set[str], words: set[str], unit: ColumnUnit | None) -> Meaning | None:
     """Torque and current."""
     if "torque" in means and fits("torque", unit):
         sure = 1 if words & OTHER_AXES else 2
@@ -160,7 +160,7 @@ def _drive(means: set[str], words: set[str], unit: Unit | None) -> Meaning | Non
     return None
 
 
-def _motion(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None:
+def _motion(means: set[str], words: set[str], unit: ColumnUnit | None) -> Meaning | None:
     """Sinkage; wheel and carriage as speed, angle, position or counts."""
     rate = unit is not None and any(fits(c, unit) for c in ("wheel_speed", "carriage_speed"))
     speed = bool(means & {"speed", "turning"}) or rate or bool(words & {"v", "vx"})
@@ -178,7 +178,7 @@ def _motion(means: set[str], words: set[str], unit: Unit | None) -> Meaning | No
     return _unnamed(means, words, speed, counts and "counts" in means, unit)
 
 
-def _wheel(speed: bool, counts: bool, unit: Unit | None) -> Meaning | None:
+def _wheel(speed: bool, counts: bool, unit: ColumnUnit | None) -> Meaning | None:
     if counts:
         return Meaning("wheel_count", 2, _of_counts("wheel", counts))
     if unit is not None and fits("rim_speed", unit):
@@ -196,7 +196,7 @@ def _of_counts(what: str, counts: bool) -> str:
 
 
 def _unnamed(
-    means: set[str], words: set[str], speed: bool, counts: bool, unit: Unit | None
+    means: set[str], words: set[str], speed: bool, counts: bool, unit: ColumnUnit | None
 ) -> Meaning | None:
     """Motion of which the name does not say whose."""
     turning = "turning" in means or (unit is not None and fits("wheel_speed", unit))
@@ -222,7 +222,7 @@ def _unnamed(
     return None
 
 
-def _by_unit(means: set[str], words: set[str], unit: Unit | None) -> Meaning | None:
+def _by_unit(means: set[str], words: set[str], unit: ColumnUnit | None) -> Meaning | None:
     """Where the name says nothing that is known, and the unit is of one channel alone."""
     if unit is None or means - {"motor", "axle"}:
         return None

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gritd.estimator.config.settings import Settings, settings_of_run
-from gritd.estimator.plausibility.driven import Driven, Raw, driven
-from gritd.estimator.plausibility.mistakes import Source
-from gritd.tools.importers.recording import Stream
+from gritd.estimator.plausibility.driven import DrivenRun, Raw, driven
+from gritd.estimator.plausibility.mistakes import QuantitySource
+from gritd.tools.importers.recording import ChannelReadings
 from gritd.tools.importers.series.mapping import CLOCK, SeriesMap
 from gritd.tools.importers.series.runs import SeriesRun
 
@@ -23,8 +23,8 @@ QUANTITIES = {
 
 
 def driven_of(
-    runs: Sequence[SeriesRun], streams: Sequence[Sequence[Stream]], settings: Settings
-) -> list[tuple[Driven, Settings]]:
+    runs: Sequence[SeriesRun], streams: Sequence[Sequence[ChannelReadings]], settings: Settings
+) -> list[tuple[DrivenRun, Settings]]:
     """Every run as it was driven, with the settings that hold for it."""
     made = []
     for run, own in zip(runs, streams, strict=True):
@@ -34,7 +34,7 @@ def driven_of(
     return made
 
 
-def sources_of(mapped: SeriesMap) -> dict[str, Source]:
+def sources_of(mapped: SeriesMap) -> dict[str, QuantitySource]:
     """Which column each quantity comes from."""
     sources = {}
     for quantity, channels in QUANTITIES.items():
@@ -44,5 +44,5 @@ def sources_of(mapped: SeriesMap) -> dict[str, Source]:
                 column = mapped.columns[name]
                 unit = column.unit if channel != "time" or column.unit != CLOCK else ""
                 scale = column.per_unit if unit else 1.0
-                sources[quantity] = Source(name, channel, unit, scale)
+                sources[quantity] = QuantitySource(name, channel, unit, scale)
     return sources

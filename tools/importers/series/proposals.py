@@ -14,7 +14,7 @@ from gritd.tools.importers.files import LARGEST, Array
 from gritd.tools.importers.series.columns import Column, SeriesTable
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.mapping import CLOCK, DATE, MEASURED, TIME, Mapped
-from gritd.tools.importers.series.meaning import SI, Meaning, Unit, meaning_in, unit_of
+from gritd.tools.importers.series.meaning import SI, ColumnUnit, Meaning, meaning_in, unit_of
 from gritd.tools.importers.series.names import meanings
 from gritd.tools.importers.series.stamps import TimeColumn
 from gritd.tools.importers.series.times import ORDERS, TimeFormatError, likely_unit
@@ -109,7 +109,9 @@ def even(table: SeriesTable) -> Proposal | None:
 # --- time and runs ---
 
 
-def _of_time(name: str, column: Column, meaning: Meaning, unit: Unit | None) -> Proposal | None:
+def _of_time(
+    name: str, column: Column, meaning: Meaning, unit: ColumnUnit | None
+) -> Proposal | None:
     """What can be read as a time."""
     if column.words is not None:
         return _of_dates(name, column, meaning)
@@ -127,7 +129,7 @@ def _of_time(name: str, column: Column, meaning: Meaning, unit: Unit | None) -> 
     return Proposal(name, TIME, meaning.sure, tuple(options), asks)
 
 
-def _units_of_time(known: Array, unit: Unit | None) -> tuple[list[str], str]:
+def _units_of_time(known: Array, unit: ColumnUnit | None) -> tuple[list[str], str]:
     """The units that numbers may be a time in, and why."""
     if unit is not None:
         return [unit.name], "unit of the file"
@@ -196,7 +198,7 @@ def _of_runs(name: str, columns: Sequence[Column]) -> Proposal | None:
 
 
 def _measured(
-    name: str, columns: Sequence[Column], meaning: Meaning, unit: Unit | None
+    name: str, columns: Sequence[Column], meaning: Meaning, unit: ColumnUnit | None
 ) -> Proposal | None:
     known = [column.numbers[np.isfinite(column.numbers)] for column in columns]
     if not known[0].size or any(np.any(np.abs(values) > LARGEST) for values in known):
@@ -223,7 +225,7 @@ def _channels(channel: str) -> tuple[str, ...]:
     return {"torque?": tuple(SIDES), "force?": FORCES}.get(channel, (channel,))
 
 
-def _option(channel: str, column: Column, known: Array, unit: Unit | None) -> Option:
+def _option(channel: str, column: Column, known: Array, unit: ColumnUnit | None) -> Option:
     guessed = unit is None and channel not in COUNTS
     likely = _unit(unit, _likely_unit(channel, known))
     text = f"channel: {channel}, unit: {likely}{_factor(unit, '1.0')}"
@@ -248,17 +250,17 @@ def _wraps(channel: str, turned: Array) -> str:
     return f", wraps: {whole:.0f} count" if whole and abs(wrap / whole - 1.0) < NEAR else ""
 
 
-def _unit(unit: Unit | None, likely: str) -> str:
+def _unit(unit: ColumnUnit | None, likely: str) -> str:
     return likely if unit is None else unit.name
 
 
-def _factor(unit: Unit | None, plain: str) -> str:
+def _factor(unit: ColumnUnit | None, plain: str) -> str:
     if unit is None or unit.factor == 1.0 or not plain:
         return ""
     return f", factor: {unit.factor:.7g}"
 
 
-def _doubts(channel: str, known: Array, unit: Unit | None) -> str:
+def _doubts(channel: str, known: Array, unit: ColumnUnit | None) -> str:
     """What else has to be decided: a sign, a unit that nothing tells, counts."""
     doubts = []
     if _falls(channel, known):

@@ -50,7 +50,7 @@ class RunFiles:
 
 
 @dataclass(frozen=True)
-class Part:
+class SourcePart:
     """Columns of one clock, by the map's labels, with what the map says of them alone.
 
     shift: [s] is added to the times.
@@ -175,7 +175,9 @@ def _complete(run: str, own: Mapping[str, Path], sources: Sequence[MapSource]) -
 # --- what is used of a file ---
 
 
-def parts(path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = None) -> list[Part]:
+def parts(
+    path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = None
+) -> list[SourcePart]:
     """The columns that a map names of a file, those of one clock together. Raises RigFileError."""
     tables = read(path, Wanted(frozenset(source.columns)), source.columns, told)
     return parts_of(path, tables, source, mapped)
@@ -183,7 +185,7 @@ def parts(path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = 
 
 def parts_of(
     path: Path, tables: Sequence[SeriesTable], source: MapSource, mapped: SeriesMap
-) -> list[Part]:
+) -> list[SourcePart]:
     """The same of a file that was read. Raises RigFileError."""
     places = {name: _place(path, tables, name) for name in source.columns}
 
@@ -261,7 +263,7 @@ def _part(
     names: Sequence[str],
     times: Sequence[str],
     rate: float | None,
-) -> Part:
+) -> SourcePart:
     """Columns of one clock, and the map of them. Raises RigFileError."""
     table = tables[places[names[0]][0]]
     named = [*times, *names]
@@ -284,7 +286,7 @@ def _part(
     clocked = len(tables) > 1 or table.clock is not None or len(columns) < len(places)
     if clocked and rate is None:  # a rate counts the empty rows too
         made = made.at(_filled([columns[source.label(name)] for name in names]))
-    return Part(made, replace(mapped, columns=kinds, rate=rate), source.shift)
+    return SourcePart(made, replace(mapped, columns=kinds, rate=rate), source.shift)
 
 
 def _filled(columns: Iterable[Column]) -> NDArray[np.bool_]:

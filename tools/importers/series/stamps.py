@@ -15,8 +15,8 @@ from gritd.tools.importers.series.mapping import CLOCK, Mapped, SeriesMap
 from gritd.tools.importers.series.times import (
     NONE,
     NS,
-    Clock,
     Nanoseconds,
+    TimeFormat,
     TimeFormatError,
     clock,
     of_floats,
@@ -38,7 +38,7 @@ class TimeColumn:
 
     def __init__(self, mapped: Mapped) -> None:
         self._mapped = mapped
-        self._clock: Clock | None = None
+        self._clock: TimeFormat | None = None
 
     def read(self, words: Sequence[str]) -> Nanoseconds:
         """[ns], shape (n,), NONE where a word is a gap. Raises TimeFormatError."""

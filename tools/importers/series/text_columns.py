@@ -54,7 +54,7 @@ class Builder(Protocol):
     def column(self) -> Column: ...
 
 
-class Numbers:
+class NumberColumn:
     """A column of numbers; `first` are some of its cells, which tell its last digit. `commas`:
     whether a comma in it can only be a decimal one.
     """

@@ -74,7 +74,7 @@ class TimeFormatError(ValueError):
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeFormat:
     """How a column of dates or times of day is written.
 
     form: one of FORMS. order: one of ORDERS, where the date is three numbers.
@@ -144,7 +144,7 @@ class Clock:
         return _checked(day + instant - _zone(match["zone"]), match.string, 0)
 
 
-def clock(words: Sequence[str], order: str = "") -> Clock:
+def clock(words: Sequence[str], order: str = "") -> TimeFormat:
     """How a column is written, from some of its words; `order` as the map states it, or ''.
 
     Four digits first are a year; where dots stand the day is first. Otherwise a number beyond 12
@@ -161,10 +161,10 @@ def clock(words: Sequence[str], order: str = "") -> Clock:
             "time such as 14:03:05.250; numbers need their unit in the map"
         )
     if form != "numbered":
-        return Clock(form)
+        return TimeFormat(form)
 
     matches = [match for word in known if (match := FORMS[form].fullmatch(word))]
-    return Clock(form, order or _order(matches))
+    return TimeFormat(form, order or _order(matches))
 
 
 def _order(matches: Sequence[re.Match[str]]) -> str:

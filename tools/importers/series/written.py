@@ -16,7 +16,7 @@ from gritd.estimator.config.yamltree import read_text
 from gritd.tools.cli.command import USAGE
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
 from gritd.tools.importers.files import RigFileError
-from gritd.tools.importers.series.calibrated import Calibrated
+from gritd.tools.importers.series.calibrated import CalibratedChannel
 from gritd.tools.importers.series.convert import Imported
 from gritd.tools.importers.series.mapping import SeriesMap
 
@@ -101,7 +101,7 @@ def _ensure(document: EditedYaml, channel: str) -> None:
 
 
 def _set_channel(
-    document: EditedYaml, channel: str, calibrated: Calibrated, interval: float
+    document: EditedYaml, channel: str, calibrated: CalibratedChannel, interval: float
 ) -> None:
     raw, physical, step = UNITS[channel]
     path = ("channels", channel)
@@ -116,7 +116,7 @@ def _set_channel(
         document.set((*path, "range"), WIDE.format(unit=raw))
 
 
-def _set_wrench(document: EditedYaml, axes: dict[str, Calibrated], interval: float) -> None:
+def _set_wrench(document: EditedYaml, axes: dict[str, CalibratedChannel], interval: float) -> None:
     path = ("channels", "wrench")
     if not document.has(*path):
         device = document.written("channels", "wheel_encoder", "device")
@@ -134,7 +134,11 @@ def _set_wrench(document: EditedYaml, axes: dict[str, Calibrated], interval: flo
 
 
 def _set_calibration(
-    document: EditedYaml, path: tuple[str, ...], calibrated: Calibrated, slope: str, unit: str
+    document: EditedYaml,
+    path: tuple[str, ...],
+    calibrated: CalibratedChannel,
+    slope: str,
+    unit: str,
 ) -> None:
     """Scale and offset; the day and the number of another calibration go."""
     scale, offset = calibrated.scale, calibrated.offset

@@ -16,7 +16,7 @@ import numpy as np
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.proof.blind import seal, strata, trial
 from gritd.tools.proof.blind.plant.worlds import WORLDS
-from gritd.tools.proof.blind.trial import Spec
+from gritd.tools.proof.blind.trial import WorkerSpec
 
 BATCH, SECRET = "batch.json", "answers/batch.json"
 AHEAD = 2  # cases in hand for every worker
@@ -35,12 +35,14 @@ class Batch:
     secret: str
     sealed: str
 
-    def specs(self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE) -> list[Spec]:
+    def specs(
+        self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE
+    ) -> list[WorkerSpec]:
         rng = np.random.default_rng(_number(self.secret, "assignments"))
         drawn = strata.assignments(self.cases, rng, self.strata, self.worlds)
 
         return [
-            Spec(
+            WorkerSpec(
                 number,
                 _number(self.secret, f"case {number}"),
                 assignment,
@@ -105,11 +107,11 @@ def resumed(output: Path) -> Batch:
 
 
 def run(
-    specs: Sequence[Spec],
+    specs: Sequence[WorkerSpec],
     executor: Executor,
     width: int,
-    sealed: Callable[[Spec, str], None],
-    finished: Callable[[Spec], None],
+    sealed: Callable[[WorkerSpec, str], None],
+    finished: Callable[[WorkerSpec], None],
     diagnosed: bool = True,
 ) -> None:
     """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends
@@ -117,7 +119,7 @@ def run(
     """
     waiting = [spec for spec in specs if not spec.done]
     waiting.reverse()
-    active: dict[Future[Any], tuple[Spec, bool]] = {}
+    active: dict[Future[Any], tuple[WorkerSpec, bool]] = {}
 
     while waiting or active:
         while waiting and len(active) < AHEAD * width:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from gritd.tools.proof.blind.shares import counted
-from gritd.tools.proof.blind.verdicts import Hypothesis, Row
+from gritd.tools.proof.blind.verdicts import CaseRow, StatedHypothesis
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 SURE = 0.9  # stated probability from which a name is meant to be relied on
 
 
-def calibration(rows: Sequence[Row]) -> dict[str, Any]:
+def calibration(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Stated probability of the first name against how often it, or the group it was stated with,
     was right.
     """
@@ -23,7 +23,7 @@ def calibration(rows: Sequence[Row]) -> dict[str, Any]:
     return {by: _reliable(spoken, by) for by in ("name", "engine")}
 
 
-def accepted(rows: Sequence[Row]) -> dict[str, Any]:
+def accepted(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """The same of all names that are accepted, and of those that are stated as sure."""
     spoken = [(row, name) for row in rows for name in row.accepted]
     sure = [(row, name) for row, name in spoken if name.probability >= SURE]
@@ -34,7 +34,7 @@ def accepted(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _reliable(spoken: Sequence[tuple[Row, Hypothesis]], by: str) -> dict[str, Any]:
+def _reliable(spoken: Sequence[tuple[CaseRow, StatedHypothesis]], by: str) -> dict[str, Any]:
     stated = np.array([name.probability for _, name in spoken])
     right = np.array([row.name_right(name, by) for row, name in spoken], dtype=float)
     table = [_bin(stated, right, low, high) for low, high in pairwise(BINS)]

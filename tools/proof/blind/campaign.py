@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gritd.tools.proof.blind.plant.axle import balance
-from gritd.tools.proof.blind.plant.contact import Ground, Rim, reaction
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim, reaction
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.respond import Orders
-from gritd.tools.proof.blind.plant.scene import Rig
+from gritd.tools.proof.blind.plant.respond import Commanded
+from gritd.tools.proof.blind.plant.scene import TrueRig
 
 RATE = 250.0  # [Hz]
 ANGLES = (0.35, 0.85)  # [rad] entry angles within which loads are chosen
@@ -22,7 +22,7 @@ RAMP = (0.4, 1.0)  # [s]
 
 
 @dataclass(frozen=True)
-class Stretch:
+class DrivenStretch:
     duration: float  # [s]
     weight: float  # [N]; 0 lifts the wheel
     slip: float
@@ -30,8 +30,8 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Run:
-    stretches: tuple[Stretch, ...]
+class BlindRun:
+    stretches: tuple[DrivenStretch, ...]
     ramp: float  # [s]
     passes: int  # 1 on fresh soil
     start: float  # [m]
@@ -86,11 +86,13 @@ def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habit
     )  # nothing else tells that the load is off
 
 
-def campaign(rig: Rig, ground: Ground, habits: Habits, rng: np.random.Generator) -> tuple[Run, ...]:
+def campaign(
+    rig: TrueRig, ground: PlantSoil, habits: Habits, rng: np.random.Generator
+) -> tuple[BlindRun, ...]:
     """Runs over soil that was prepared anew, but for second passes."""
     count = habits.runs or 1
     weights = _weights(rig, ground, min(count, habits.loads or 4), rng)
-    runs: list[Run] = []
+    runs: list[BlindRun] = []
     begins = 0.0
 
     for number in range(count):
@@ -110,7 +112,7 @@ def _start(rng: np.random.Generator) -> float:
     return 0.0 if rng.random() < 0.7 else round(float(rng.uniform(0.05, 0.3)), 2)
 
 
-def _weights(rig: Rig, ground: Ground, count: int, rng: np.random.Generator) -> list[float]:
+def _weights(rig: TrueRig, ground: PlantSoil, count: int, rng: np.random.Generator) -> list[float]:
     """Loads that sink the wheel to entry angles spread over ANGLES, in an order of chance [N]."""
     low, high = sorted(rng.uniform(*ANGLES, 2)) if count == 1 else ANGLES
     angles = np.linspace(low, high, count + 1)[:count] + rng.uniform(
@@ -123,7 +125,7 @@ def _weights(rig: Rig, ground: Ground, count: int, rng: np.random.Generator) -> 
     return [rounded[place] for place in rng.permutation(count)]
 
 
-def _run(rig: Rig, habits: Habits, weight: float, rng: np.random.Generator) -> Run:
+def _run(rig: TrueRig, habits: Habits, weight: float, rng: np.random.Generator) -> BlindRun:
     usual = float(rng.uniform(0.015, 0.04))
     slips = rng.permutation(np.linspace(*SLIPS, int(rng.integers(4, 7)))) + rng.uniform(-0.02, 0.02)
     stretches = [_stretch(weight, float(slip), usual, habits, rng) for slip in slips]
@@ -134,22 +136,22 @@ def _run(rig: Rig, habits: Habits, weight: float, rng: np.random.Generator) -> R
             replace(stretches[-1], speed=-usual),
         ]
     if habits.lifted:
-        stretches.append(Stretch(4.0, 0.0, 0.0, usual))
+        stretches.append(DrivenStretch(4.0, 0.0, 0.0, usual))
     if habits.standstill:
-        stretches.insert(0, Stretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
+        stretches.insert(0, DrivenStretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
 
     ramp = float(rng.uniform(*RAMP))
-    return Run(tuple(stretches), ramp, 1, 0.0, 0.0)
+    return BlindRun(tuple(stretches), ramp, 1, 0.0, 0.0)
 
 
 def _stretch(
     weight: float, slip: float, usual: float, habits: Habits, rng: np.random.Generator
-) -> Stretch:
+) -> DrivenStretch:
     speed = usual * float(rng.choice((0.4, 0.7, 1.0, 1.6))) if habits.speeds else usual
-    return Stretch(float(rng.uniform(4.0, 6.0)), weight, round(slip, 3), round(speed, 4))
+    return DrivenStretch(float(rng.uniform(4.0, 6.0)), weight, round(slip, 3), round(speed, 4))
 
 
-def orders(run: Run, radius: float, rate: float = RATE) -> Orders:
+def orders(run: BlindRun, radius: float, rate: float = RATE) -> Commanded:
     """What the controllers are told, smooth between the stretches. `radius` [m] is the one that is
     configured.
     """
@@ -158,10 +160,10 @@ def orders(run: Run, radius: float, rate: float = RATE) -> Orders:
     slip = _levels(run, time, [stretch.slip for stretch in run.stretches])
     weight = _levels(run, time, [stretch.weight for stretch in run.stretches])
     travel = speed * np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + np.minimum(slip, 0.0)))
-    return Orders(run.begins + time, speed / radius, travel, weight, run.passes, run.start)
+    return Commanded(run.begins + time, speed / radius, travel, weight, run.passes, run.start)
 
 
-def _levels(run: Run, time: Array, levels: list[float]) -> Array:
+def _levels(run: BlindRun, time: Array, levels: list[float]) -> Array:
     """Levels joined by half cosines of the run's ramp, each at the end of its stretch."""
     values, edge = np.full(time.size, levels[0]), 0.0
     for before, after, stretch in zip(levels[:-1], levels[1:], run.stretches[:-1], strict=True):
@@ -171,7 +173,7 @@ def _levels(run: Run, time: Array, levels: list[float]) -> Array:
     return values
 
 
-def deepest(rig: Rig, ground: Ground, weight: float) -> float:
+def deepest(rig: TrueRig, ground: PlantSoil, weight: float) -> float:
     """Entry angle [rad] at the largest slip."""
     at = np.array([1.0 - SLIPS[1]])
 
@@ -181,6 +183,6 @@ def deepest(rig: Rig, ground: Ground, weight: float) -> float:
     return float(balance(load_at, np.array([weight]), np.array([0.6]))[0])
 
 
-def with_weight(given: Orders, weight: Array) -> Orders:
+def with_weight(given: Commanded, weight: Array) -> Commanded:
     """The same orders under other weights (n,) [N]."""
     return replace(given, weight=weight)

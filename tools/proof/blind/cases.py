@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from gritd.tools.proof.blind import campaign, detect, knowledge
-from gritd.tools.proof.blind.detect import Detector, Trial
+from gritd.tools.proof.blind.detect import BlindTrial, Detector
 from gritd.tools.proof.blind.groups import NEEDED
 from gritd.tools.proof.blind.plant import worlds
 from gritd.tools.proof.blind.plant.concealed import LISTED
 from gritd.tools.proof.blind.plant.concealed import drawn as effect_drawn
-from gritd.tools.proof.blind.plant.contact import Ground
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.contact import PlantSoil
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.respond import World
-from gritd.tools.proof.blind.plant.scene import Rig
+from gritd.tools.proof.blind.plant.scene import TrueRig
 from gritd.tools.proof.blind.strata import LEVELS, USUAL, Assignment
 
 ATTEMPTS = 25  # campaigns tried until one shows the effect as strongly as wanted
@@ -40,7 +40,7 @@ WRONG_NOISE = {
 
 
 @dataclass(frozen=True)
-class Case:
+class BlindCase:
     """The answers: never shown to the diagnosis before it has spoken."""
 
     number: int
@@ -48,8 +48,8 @@ class Case:
     assignment: Assignment
     family: str
     habits: campaign.Habits
-    trial: Trial  # its world holds the concealed effects
-    reference: Trial | None  # the campaign before, without them
+    trial: BlindTrial  # its world holds the concealed effects
+    reference: BlindTrial | None  # the campaign before, without them
     noise_factor: float  # stated noise over true
     detectability: float  # D of all concealed effects together
     single: tuple[float, ...]  # D of each
@@ -61,7 +61,7 @@ class Case:
     ]  # what fitting adds to a held-out error, by the diagnosis' channels [SI²]
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
+    def effects(self) -> tuple[PlantEffect, ...]:
         return self.trial.world.effects
 
     def stated(self) -> knowledge.Knowledge:
@@ -97,21 +97,21 @@ class Case:
         }
 
 
-def _told(effect: Effect) -> dict[str, Any]:
+def _told(effect: PlantEffect) -> dict[str, Any]:
     return {"name": effect.name, "form": type(effect).__name__, **asdict(effect)}
 
 
-def _soil(trial: Trial) -> dict[str, float]:
+def _soil(trial: BlindTrial) -> dict[str, float]:
     return {name: float(value) for name, value in asdict(trial.world.ground).items()}
 
 
-def drawn(number: int, seed: int, assignment: Assignment) -> Case:
+def drawn(number: int, seed: int, assignment: Assignment) -> BlindCase:
     """A case from its seed. Campaigns are drawn until the effect shows as wanted, or the best of
     them is taken.
     """
     rng = np.random.default_rng(seed)
     wanted = detect.LIMIT * LEVELS.get(assignment.level, 0.0)
-    best: Case | None = None
+    best: BlindCase | None = None
 
     for _ in range(ATTEMPTS if assignment.effects else 1):
         case = _attempt(number, seed, assignment, wanted, rng)
@@ -126,7 +126,7 @@ def drawn(number: int, seed: int, assignment: Assignment) -> Case:
 
 def _attempt(
     number: int, seed: int, assignment: Assignment, wanted: float, rng: np.random.Generator
-) -> Case:
+) -> BlindCase:
     habits = campaign.habits_drawn(rng, _fixed(assignment))
     family, trial, reference = _trials(habits, assignment, rng)
     detector = Detector(trial)
@@ -140,7 +140,7 @@ def _attempt(
         fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
     effects = tuple(effect for effect, _ in fitted)
 
-    return Case(
+    return BlindCase(
         number=number,
         seed=seed,
         assignment=assignment,
@@ -165,7 +165,7 @@ def _fixed(assignment: Assignment) -> campaign.Habits:
 
 def _trials(
     habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
-) -> tuple[str, Trial, Trial | None]:
+) -> tuple[str, BlindTrial, BlindTrial | None]:
     """Soil family, the campaign, and the reference campaign before it, if any."""
     family, trial = _trial(habits, assignment, rng)
     if not assignment.pair:
@@ -181,7 +181,7 @@ def _trials(
 
 def _trial(
     habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
-) -> tuple[str, Trial]:
+) -> tuple[str, BlindTrial]:
     """Soil, rig, world, knowledge, sensors and campaign."""
     while True:
         family, ground = knowledge.ground_drawn(rng)
@@ -198,12 +198,12 @@ def _trial(
 
     if assignment.noise == "slow":
         chain = knowledge.slowed(chain)
-    return family, Trial(World(rig, ground, bed=bed, habits=own), known, chain, runs)
+    return family, BlindTrial(World(rig, ground, bed=bed, habits=own), known, chain, runs)
 
 
 def _runs(
-    rig: Rig, ground: Ground, habits: campaign.Habits, rng: np.random.Generator
-) -> tuple[campaign.Run, ...]:
+    rig: TrueRig, ground: PlantSoil, habits: campaign.Habits, rng: np.random.Generator
+) -> tuple[campaign.BlindRun, ...]:
     """Another campaign of the same rig."""
     while True:
         runs = campaign.campaign(rig, ground, habits, rng)
@@ -211,7 +211,7 @@ def _runs(
             return runs
 
 
-def _drivable(rig: Rig, ground: Ground, runs: tuple[campaign.Run, ...]) -> bool:
+def _drivable(rig: TrueRig, ground: PlantSoil, runs: tuple[campaign.BlindRun, ...]) -> bool:
     """Whether no load bogs the wheel, nor is too small or too large for a testbed."""
     weights = [run.weight for run in runs]
     return (
@@ -226,7 +226,7 @@ def noise_factor(nothing: bool, rng: np.random.Generator) -> float:
     return float(rng.choice((0.5, 2.0))) if rng.random() < WRONG_NOISE[nothing] else 1.0
 
 
-def _judged(case: Case, rng: np.random.Generator) -> Case:
+def _judged(case: BlindCase, rng: np.random.Generator) -> BlindCase:
     """With the oracle's error, and the rivals that this campaign cannot tell from a single listed
     effect.
     """
@@ -238,7 +238,7 @@ def _judged(case: Case, rng: np.random.Generator) -> Case:
     return replace(case, oracle_variance=variance, inseparable=rivals)
 
 
-def _rivals(case: Case, detector: Detector, rng: np.random.Generator) -> dict[str, float]:
+def _rivals(case: BlindCase, detector: Detector, rng: np.random.Generator) -> dict[str, float]:
     change = detector.change(case.effects)
     left = {
         name: detector.beside(change, detector.rivals(name, rng))

@@ -21,12 +21,12 @@ from scipy.linalg import cho_solve
 from gritd.tools.proof.blind import campaign
 from gritd.tools.proof.blind.knowledge import Knowledge
 from gritd.tools.proof.blind.plant.concealed import drawn
-from gritd.tools.proof.blind.plant.contact import Ground
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.contact import PlantSoil
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.respond import World, responses
-from gritd.tools.proof.blind.plant.scene import Felt, Motion
-from gritd.tools.proof.blind.plant.sensors import Chain
+from gritd.tools.proof.blind.plant.scene import Felt, TrueMotion
+from gritd.tools.proof.blind.plant.sensors import SensorChain
 from gritd.tools.proof.blind.plant.servo import summed
 from gritd.tools.proof.blind.whitening import (
     INSTRUMENT,
@@ -48,13 +48,13 @@ SHAPES = 3  # draws of a rival's shape that may imitate together
 
 
 @dataclass(frozen=True)
-class Trial:
+class BlindTrial:
     """A campaign and all that is true of it but the effect."""
 
     world: World
     known: Knowledge
-    chain: Chain
-    runs: tuple[campaign.Run, ...]
+    chain: SensorChain
+    runs: tuple[campaign.BlindRun, ...]
 
     @property
     def wrench(self) -> bool:
@@ -64,7 +64,7 @@ class Trial:
 class Detector:
     """What one campaign can see."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: BlindTrial) -> None:
         self._trial = trial
         self._motions = [_motion(run, trial) for run in trial.runs]
         bare = trial.world.with_effects()
@@ -98,11 +98,11 @@ class Detector:
             sinkage=typical([f.sinkage for f in felt]),
         )
 
-    def detectability(self, effects: Sequence[Effect]) -> float:
+    def detectability(self, effects: Sequence[PlantEffect]) -> float:
         """D of these effects together."""
         return float(np.sqrt(max(self._left(self.change(effects)), 0.0)))
 
-    def change(self, effects: Sequence[Effect]) -> Array:
+    def change(self, effects: Sequence[PlantEffect]) -> Array:
         """What the effects change in all channels and runs, whitened (m,)."""
         return self._whitened(self._changes(effects))
 
@@ -128,7 +128,7 @@ class Detector:
             [self.change([replace(e, strength=0.1 * e.strength)]) for e in made], axis=1
         )
 
-    def refit_variance(self, effects: Sequence[Effect]) -> dict[str, float]:
+    def refit_variance(self, effects: Sequence[PlantEffect]) -> dict[str, float]:
         """What fitting adds to the error of a held-out run [SI²], by channel, expected, to first
         order.
 
@@ -166,7 +166,7 @@ class Detector:
         known = np.stack(kept, axis=1)
         return np.asarray(np.linalg.inv(known.T @ known + np.eye(known.shape[1])), dtype=float)
 
-    def _strength(self, effects: Sequence[Effect], place: int) -> Signals:
+    def _strength(self, effects: Sequence[PlantEffect], place: int) -> Signals:
         """Change for a strength as much larger as it is large: its prior is as wide as itself."""
         step = 0.05
         moved = list(effects)
@@ -177,11 +177,11 @@ class Detector:
         shadow = self._columns.T @ change
         return float(change @ change - shadow @ cho_solve((self._factor, True), shadow))
 
-    def _changes(self, effects: Sequence[Effect]) -> Signals:
+    def _changes(self, effects: Sequence[PlantEffect]) -> Signals:
         """What the effects change in what is read beyond what is predicted."""
         return less(self._misfit(effects), self._own)
 
-    def _misfit(self, effects: Sequence[Effect]) -> Signals:
+    def _misfit(self, effects: Sequence[PlantEffect]) -> Signals:
         """Read with the effects, less predicted without from the motion and load that were read."""
         world = self._trial.world.with_effects(*effects)
         near = [bare.scene for bare in self._bare]
@@ -225,7 +225,7 @@ class Detector:
         *separate, alike, driven = (scaled(change, 1.0 / SMALL) for change in self._moved(moved))
         return [*separate, alike, *one_by_one(alike), driven]
 
-    def _moved(self, variants: Sequence[tuple[Ground, float, float]]) -> list[Signals]:
+    def _moved(self, variants: Sequence[tuple[PlantSoil, float, float]]) -> list[Signals]:
         """Changes by another soil, heavier weights or a faster carriage, either by a share."""
         asked = [
             (replace(self._trial.world, ground=ground, effects=()), _faster(m, heavier, faster))
@@ -263,7 +263,7 @@ class Detector:
         ]
 
 
-def _told(felt: Felt, trial: Trial) -> Motion:
+def _told(felt: Felt, trial: BlindTrial) -> TrueMotion:
     """The motion and load that an engineer sees: the encoders' and the force sensor's."""
     motion = felt.scene.motion
     changed: dict[str, Any] = {}
@@ -275,7 +275,7 @@ def _told(felt: Felt, trial: Trial) -> Motion:
     return replace(motion, **changed) if changed else motion
 
 
-def _faster(motion: Motion, heavier: float, faster: float) -> Motion:
+def _faster(motion: TrueMotion, heavier: float, faster: float) -> TrueMotion:
     """The same run with weights and travel larger by a share."""
     return replace(
         motion,
@@ -285,16 +285,18 @@ def _faster(motion: Motion, heavier: float, faster: float) -> Motion:
     )
 
 
-def _motion(run: campaign.Run, trial: Trial) -> Motion:
+def _motion(run: campaign.BlindRun, trial: BlindTrial) -> TrueMotion:
     orders = campaign.orders(run, trial.known.radius, RATE)
     step = 1.0 / RATE
     turn, travel = summed(orders.omega, step), orders.start + summed(orders.speed, step)
-    return Motion(
+    return TrueMotion(
         orders.time, turn, orders.omega, travel, orders.speed, orders.weight, orders.passes
     )
 
 
-def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Effect, float]:
+def strengthened(
+    detector: Detector, effect: PlantEffect, wanted: float
+) -> tuple[PlantEffect, float]:
     """The effect at the strength where its D is as wanted, and that D; at the largest strength
     where D stays below.
     """

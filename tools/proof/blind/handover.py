@@ -15,11 +15,11 @@ from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.proof.blind import campaign
-from gritd.tools.proof.blind.cases import Case
-from gritd.tools.proof.blind.detect import Trial
+from gritd.tools.proof.blind.cases import BlindCase
+from gritd.tools.proof.blind.detect import BlindTrial
 from gritd.tools.proof.blind.knowledge import Instrument, Knowledge, Stated
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.respond import Orders, drives
+from gritd.tools.proof.blind.plant.respond import Commanded, drives
 from gritd.tools.proof.blind.plant.scene import Felt
 from gritd.tools.proof.blind.plant.sensors import readings
 
@@ -31,11 +31,11 @@ REFERENCE, NEW = "reference", "new"  # folders of a pair's recordings
 TRUTH_RATE = 50.0  # [Hz] of the noiseless channels that judge held-out errors
 
 
-class Driven(NamedTuple):
+class DrivenCampaign(NamedTuple):
     """A campaign as it was driven: the concealed truth, without noise."""
 
     folder: str  # in which its recordings are handed over; none where there is one campaign alone
-    trial: Trial
+    trial: BlindTrial
     begins: tuple[int, ...]  # of each run [ns since the epoch]
     felt: list[Felt]  # of each run
 
@@ -44,29 +44,29 @@ class Driven(NamedTuple):
         return f"{self.folder or 'run'}-{number + 1}"
 
 
-def driven(case: Case) -> list[Driven]:
+def driven(case: BlindCase) -> list[DrivenCampaign]:
     """The campaigns of a case, the reference first."""
     alone = not case.reference
     campaigns = [] if case.reference is None else [_driven(case, case.reference, REFERENCE, 0)]
     return [*campaigns, _driven(case, case.trial, "" if alone else NEW, 0 if alone else DAY)]
 
 
-def _driven(case: Case, trial: Trial, folder: str, later: int) -> Driven:
+def _driven(case: BlindCase, trial: BlindTrial, folder: str, later: int) -> DrivenCampaign:
     begun = FIRST + case.seed % 10_000_000 * NS + later
     begins = tuple(begun + round(run.begins * NS) for run in trial.runs)
-    return Driven(
+    return DrivenCampaign(
         folder, trial, begins, drives(trial.world, [_orders(case, run) for run in trial.runs])
     )
 
 
-def _orders(case: Case, run: campaign.Run) -> Orders:
+def _orders(case: BlindCase, run: campaign.BlindRun) -> Commanded:
     """What is told to the controllers, under the weights as they truly are."""
     orders = campaign.orders(run, case.trial.known.radius)
     share = 1.0 + _weight_error(case, run.weight)
     return campaign.with_weight(orders, orders.weight * share)
 
 
-def write(case: Case, campaigns: Sequence[Driven], folder: Path) -> list[Path]:
+def write(case: BlindCase, campaigns: Sequence[DrivenCampaign], folder: Path) -> list[Path]:
     """testbed.yaml, its CAN database and run-1.mcap … of each campaign in a new folder. Returns the
     recordings. Raises OSError.
     """
@@ -84,7 +84,12 @@ def write(case: Case, campaigns: Sequence[Driven], folder: Path) -> list[Path]:
 
 
 def _record(
-    case: Case, one: Driven, number: int, text: str, folder: Path, rng: np.random.Generator
+    case: BlindCase,
+    one: DrivenCampaign,
+    number: int,
+    text: str,
+    folder: Path,
+    rng: np.random.Generator,
 ) -> Path:
     run, trial = one.trial.runs[number], one.trial
     sent = readings(trial.chain, one.felt[number], trial.known.pulley, one.begins[number], rng)
@@ -104,7 +109,7 @@ def _written(path: Path, text: str, info: RunInfo, sent: Sequence[Reading]) -> N
         writer.close()
 
 
-def _weight_error(case: Case, weight: float) -> float:
+def _weight_error(case: BlindCase, weight: float) -> float:
     """Relative error of the weights, within their sigma: half the carriage's, half the plates'."""
     sources = ((case.seed, 2), (case.seed, 3, round(weight * 1e3)))
     drawn = [
@@ -114,7 +119,7 @@ def _weight_error(case: Case, weight: float) -> float:
     return case.trial.known.weight_share * sum(drawn) / float(np.sqrt(2.0))
 
 
-def truth(one: Driven, number: int) -> dict[str, Array]:
+def truth(one: DrivenCampaign, number: int) -> dict[str, Array]:
     """One run's noiseless channels (n,) as the configured calibration shows them, SI, at
     TRUTH_RATE; time from its start.
     """

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from gritd.tools.proof.blind.handover import NEW
-from gritd.tools.proof.blind.trial import Spec
+from gritd.tools.proof.blind.trial import WorkerSpec
 
 DAY = 86_400.0  # [s] from a reference campaign to the new one: times may count from either
 
 
 def errors(
-    result: Mapping[str, Any], answers: Mapping[str, Any], spec: Spec
+    result: Mapping[str, Any], answers: Mapping[str, Any], spec: WorkerSpec
 ) -> dict[str, tuple[float, float, float]]:
     """By channel, root mean square errors on the diagnosis' own held-out samples: before, after,
     and of the noiseless truth on them [the channel's unit].

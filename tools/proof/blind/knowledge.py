@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground
-from gritd.tools.proof.blind.plant.scene import Rig
-from gritd.tools.proof.blind.plant.sensors import Chain, Converter, Noise
+from gritd.tools.proof.blind.plant.contact import PlantSoil
+from gritd.tools.proof.blind.plant.scene import TrueRig
+from gritd.tools.proof.blind.plant.sensors import Converter, SensorChain, SensorNoise
 from gritd.tools.proof.blind.plant.servo import Servo
 
 # name: c [Pa], φ [degrees], k [m], n, K of σ = K zⁿ [Pa/mⁿ]; each is drawn around
@@ -73,7 +73,7 @@ class Knowledge:
     instruments: dict[str, Instrument]  # by channel, with drawbar_pull, load, torque of the wrench
 
 
-def ground_drawn(rng: np.random.Generator) -> tuple[str, Ground]:
+def ground_drawn(rng: np.random.Generator) -> tuple[str, PlantSoil]:
     """A soil of a family, its parameters drawn around the family's."""
     family = str(rng.choice(list(FAMILIES)))
     cohesion, phi, *others = FAMILIES[family]
@@ -82,10 +82,10 @@ def ground_drawn(rng: np.random.Generator) -> tuple[str, Ground]:
         value * float(np.exp(s * rng.standard_normal()))
         for value, s in zip(values, SPREAD.values(), strict=True)
     ]
-    return family, Ground(*drawn)
+    return family, PlantSoil(*drawn)
 
 
-def soil_known(ground: Ground, rng: np.random.Generator) -> dict[str, Stated]:
+def soil_known(ground: PlantSoil, rng: np.random.Generator) -> dict[str, Stated]:
     """What a bevameter told: the truth and an error, within the sigma it states."""
     relative = {
         "cohesion": float(rng.uniform(0.15, 0.35)),
@@ -104,15 +104,15 @@ def soil_known(ground: Ground, rng: np.random.Generator) -> dict[str, Stated]:
     return known
 
 
-def rig_drawn(rng: np.random.Generator) -> Rig:
+def rig_drawn(rng: np.random.Generator) -> TrueRig:
     """A small testbed; its drives and its torque constant follow from the loads, see `fitted`."""
     radius = float(np.round(rng.uniform(0.055, 0.15), 3))
     width = float(np.round(radius * rng.uniform(0.6, 1.2), 3))
     idle = Servo(1.0, 1.0, 1.0)
-    return Rig(radius, width, 1.0, idle, idle, float(rng.uniform(0.005, 0.025)))
+    return TrueRig(radius, width, 1.0, idle, idle, float(rng.uniform(0.005, 0.025)))
 
 
-def fitted(rig: Rig, heaviest: float, constant: Stated, rng: np.random.Generator) -> Rig:
+def fitted(rig: TrueRig, heaviest: float, constant: Stated, rng: np.random.Generator) -> TrueRig:
     """The rig with drives that its loads ask for: full torque slows the wheel by 4-12 mrad/s until
     they catch up.
     """
@@ -126,7 +126,7 @@ def fitted(rig: Rig, heaviest: float, constant: Stated, rng: np.random.Generator
 
 
 def knowledge_drawn(
-    rig: Rig, ground: Ground, heaviest: float, wrench: bool, rng: np.random.Generator
+    rig: TrueRig, ground: PlantSoil, heaviest: float, wrench: bool, rng: np.random.Generator
 ) -> Knowledge:
     """A configuration for this rig: its calibrations are what the rig will be drawn around."""
     torque = heaviest * rig.radius
@@ -160,7 +160,7 @@ def _carriage(rng: np.random.Generator) -> Instrument:
     return Instrument(Stated(scale, 5e-4 * scale), Stated(0.0, 0.0), 0.35)
 
 
-def _pot(rig: Rig, volts: float) -> Instrument:
+def _pot(rig: TrueRig, volts: float) -> Instrument:
     scale = float(np.round(rig.radius * 0.35, 4))
     return Instrument(Stated(scale, 0.002 * scale), Stated(-0.5 * scale, 1.5e-4), volts)
 
@@ -174,7 +174,7 @@ def _wrench(heaviest: float, torque: float, worse: float) -> dict[str, Instrumen
     }
 
 
-def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
+def chain_drawn(known: Knowledge, rng: np.random.Generator) -> SensorChain:
     """The rig's sensors as they truly are: off their calibration by an error within its sigma,
     coloured noise.
     """
@@ -186,7 +186,9 @@ def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
     simple = tuple(
         made[name] for name in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt")
     )
-    return Chain(simple, wrench, float(rng.uniform(2e-5, 4e-4)), float(rng.uniform(0.0, 0.01)))
+    return SensorChain(
+        simple, wrench, float(rng.uniform(2e-5, 4e-4)), float(rng.uniform(0.0, 0.01))
+    )
 
 
 def _converter(name: str, instrument: Instrument, rng: np.random.Generator) -> Converter:
@@ -197,7 +199,7 @@ def _converter(name: str, instrument: Instrument, rng: np.random.Generator) -> C
     share = 0.0 if encoder else float(rng.uniform(0.2, 0.6))
     white = 0.2 if encoder else instrument.noise * float(np.sqrt(1.0 - share**2))
 
-    noise = Noise(
+    noise = SensorNoise(
         white,
         share * instrument.noise,
         float(np.exp(rng.uniform(np.log(0.03), np.log(0.6)))),
@@ -220,7 +222,7 @@ def _converter(name: str, instrument: Instrument, rng: np.random.Generator) -> C
     )
 
 
-def slowed(chain: Chain) -> Chain:
+def slowed(chain: SensorChain) -> SensorChain:
     """The same sensors with noise as large, nine tenths of it correlated over SLOW."""
     wrench = chain.wrench
     if wrench is not None:
@@ -234,10 +236,10 @@ def _slowed(one: Converter) -> Converter:
         return one
     total = float(np.hypot(one.noise.white, one.noise.colour))
     white = total * float(np.sqrt(1.0 - SLOW_SHARE**2))
-    return replace(one, noise=Noise(white, SLOW_SHARE * total, SLOW))
+    return replace(one, noise=SensorNoise(white, SLOW_SHARE * total, SLOW))
 
 
-def prepared(ground: Ground, rng: np.random.Generator) -> Ground:
+def prepared(ground: PlantSoil, rng: np.random.Generator) -> PlantSoil:
     """The soil after the bed was prepared anew, within its repeatability."""
     drawn = {
         name: getattr(ground, name)

@@ -10,7 +10,7 @@ from typing import Any
 
 from gritd.tools.proof.blind import tables
 from gritd.tools.proof.blind.plant.concealed import UNLISTED as CONCEALED
-from gritd.tools.proof.blind.verdicts import FAILED, INSUFFICIENT, NOTHING, UNLISTED, Row
+from gritd.tools.proof.blind.verdicts import FAILED, INSUFFICIENT, NOTHING, UNLISTED, CaseRow
 
 STYLE = """
 :root { --ink: #1c1c1a; --faint: #6b6a64; --rule: #d8d6cf; --paper: #fdfcf9; 
@@ -44,7 +44,7 @@ FIGURES = "Figures"  # the table without a head
 OTHERS = (NOTHING, UNLISTED, INSUFFICIENT, FAILED, "(one of them)", "(another)")
 
 
-def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
+def page(score: Mapping[str, Any], rows: Sequence[CaseRow], seal: str) -> str:
     """The whole page."""
     drawn = (
         f"<p>{score['cases']} cases, drawn and simulated by an independent plant. The answers were "
@@ -154,7 +154,7 @@ def _effects(effects: Mapping[str, Any]) -> str:
     return _table([head, *rows], head=True)
 
 
-def _misses(rows: Sequence[Row]) -> str:
+def _misses(rows: Sequence[CaseRow]) -> str:
     wrong = [row for row in rows if tables.missed(row)]
     if not wrong:
         return "<p>Nothing.</p>"

@@ -13,14 +13,14 @@ from gritd.tools.proof.blind import score_worlds
 from gritd.tools.proof.blind.calibration import accepted, calibration
 from gritd.tools.proof.blind.shares import counted, quantiles
 from gritd.tools.proof.blind.strata import AWKWARD, LEVELS, STRATA
-from gritd.tools.proof.blind.verdicts import Row
+from gritd.tools.proof.blind.verdicts import CaseRow
 
 BY = ("name", "table", "engine", "plant")  # how a name counts as right
 AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair"))
 ONE = ("single", "usual", "absorbed", "confounded")  # strata with one listed effect
 
 
-def score(rows: Sequence[Row]) -> dict[str, Any]:
+def score(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Everything, as JSON types. What is not said to be of foreign worlds or pairs is of campaigns
     alone in the paper's world.
     """
@@ -56,11 +56,11 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _true_names(rows: Iterable[Row]) -> set[str]:
+def _true_names(rows: Iterable[CaseRow]) -> set[str]:
     return {name for row in rows for name in row.truth}
 
 
-def _false_alarms(given: Sequence[Row]) -> dict[str, Any]:
+def _false_alarms(given: Sequence[CaseRow]) -> dict[str, Any]:
     nulls = [row for row in given if row.verdict != "failed"]
     usual = [row for row in nulls if row.stratum == "none"]
     ways = {one.level: [row for row in nulls if row.level == one.level] for one in AWKWARD}
@@ -73,7 +73,7 @@ def _false_alarms(given: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _names(rows: Sequence[Row]) -> dict[str, Any]:
+def _names(rows: Sequence[CaseRow]) -> dict[str, Any]:
     return {
         "detected": counted(row.alarmed for row in rows),
         "first": {by: counted(row.first_right(by) for row in rows) for by in BY},
@@ -82,12 +82,12 @@ def _names(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _companions(rows: Sequence[Row]) -> dict[str, Any]:
+def _companions(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Campaigns with one or two listed effects: a further name accepted that is not there."""
     return {by: counted(row.false_companion(by) for row in rows) for by in ("table", "engine")}
 
 
-def _strata(rows: Sequence[Row]) -> dict[str, Any]:
+def _strata(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """By stratum, and by level within those that have several."""
     counts = {}
     for stratum in STRATA:
@@ -104,7 +104,7 @@ def _order(level: str) -> tuple[int, str]:
     return (list(LEVELS).index(level) if level in LEVELS else -1, level)
 
 
-def _two(rows: Sequence[Row]) -> dict[str, Any]:
+def _two(rows: Sequence[CaseRow]) -> dict[str, Any]:
     return {
         "one named": counted(
             any(row.name_right(name, "table") for name in row.accepted) for row in rows
@@ -117,7 +117,7 @@ def _two(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def unlisted(rows: Sequence[Row]) -> dict[str, Any]:
+def unlisted(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Of campaigns with physics outside the list that one who knows all else would see."""
     seen = [row for row in rows if row.detectable]
 
@@ -132,7 +132,7 @@ def unlisted(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _soil_groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
+def _soil_groups(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
     """By what is concealed; of foreign worlds and pairs all together."""
     groups = {"none": ("none",), "awkward": ("awkward",), "one effect": ONE}
     groups |= {name: (name,) for name in ("absorbed", "two", "unlisted", "foreign", "pair")}
@@ -147,7 +147,9 @@ def _coverage(parameters: Iterable[Mapping[str, float]]) -> dict[str, Any]:
     }
 
 
-def _heldout_groups(rows: Sequence[Row], detectable: Sequence[Row]) -> dict[str, list[Row]]:
+def _heldout_groups(
+    rows: Sequence[CaseRow], detectable: Sequence[CaseRow]
+) -> dict[str, list[CaseRow]]:
     right = [row for row in detectable if row.first_right("table")]
     return {
         "none": [row for row in rows if not row.truth],
@@ -156,7 +158,7 @@ def _heldout_groups(rows: Sequence[Row], detectable: Sequence[Row]) -> dict[str,
     }
 
 
-def heldout(rows: Sequence[Row]) -> dict[str, Any]:
+def heldout(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Held-out errors over the oracle's."""
     return {
         f"over {oracle}": quantiles([row.excess(oracle) for row in rows])
@@ -164,7 +166,7 @@ def heldout(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
+def confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
     """truth → what was said first → how often; two effects count under both names joined."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
@@ -172,7 +174,7 @@ def confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
     return {truth: dict(of) for truth, of in sorted(counts.items())}
 
 
-def _heading(row: Row) -> str:
+def _heading(row: CaseRow) -> str:
     if len(row.truth) > 1:
         return "(two effects)"
     truth = " + ".join(row.truth) or "(none)"
@@ -181,7 +183,7 @@ def _heading(row: Row) -> str:
     return truth
 
 
-def _heard(row: Row) -> str:
+def _heard(row: CaseRow) -> str:
     if len(row.truth) > 1 and row.first is not None:
         return "(one of them)" if row.first_right("table") else "(another)"
     return row.spoken

@@ -11,18 +11,18 @@ from gritd.tools.proof.blind.plant.concealed import LISTED
 from gritd.tools.proof.blind.plant.worlds import WORLDS
 from gritd.tools.proof.blind.shares import counted, quantiles
 from gritd.tools.proof.blind.strata import BEDS
-from gritd.tools.proof.blind.verdicts import Row
+from gritd.tools.proof.blind.verdicts import CaseRow
 
 SOIL = ("c", "tan_phi")
 
 
-def soil(rows: Sequence[Row]) -> dict[str, Any]:
+def soil(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Errors of c and tan φ, before the diagnosis and after it, and how often σ covers them."""
     answered = [row for row in rows if row.verdict != "failed"]
     return {name: _quantity(name, answered) for name in SOIL}
 
 
-def _quantity(name: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _quantity(name: str, rows: Sequence[CaseRow]) -> dict[str, Any]:
     stated = [row.soil[name] for row in rows if name in row.soil]
     counts: dict[str, Any] = {}
     for when in ("before", "after"):
@@ -35,7 +35,7 @@ def _quantity(name: str, rows: Sequence[Row]) -> dict[str, Any]:
     return counts
 
 
-def foreign(rows: Sequence[Row]) -> dict[str, Any]:
+def foreign(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """Campaigns alone in worlds of which the diagnosis knows nothing, by world. A name is right
     where it says what is concealed, or a part of what the world has of its own.
     """
@@ -43,7 +43,7 @@ def foreign(rows: Sequence[Row]) -> dict[str, Any]:
     return {name: _foreign(of) for name, of in groups.items() if of}
 
 
-def _foreign(rows: Sequence[Row]) -> dict[str, Any]:
+def _foreign(rows: Sequence[CaseRow]) -> dict[str, Any]:
     spoken = [row for row in rows if row.first is not None]
     verdicts = ("consistent", "explained", "unlisted", "insufficient", "failed")
 
@@ -58,11 +58,11 @@ def _foreign(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _concealed_first(row: Row) -> bool:
+def _concealed_first(row: CaseRow) -> bool:
     return row.first is not None and bool(row.first.group & set(row.truth))
 
 
-def pairs(rows: Sequence[Row]) -> dict[str, Any]:
+def pairs(rows: Sequence[CaseRow]) -> dict[str, Any]:
     """A reference campaign and a new one: what is said to be new, by world and by bed."""
     groups = {"all": list(rows)} | {w: [r for r in rows if r.world == w] for w in WORLDS}
     groups |= {f"{bed} bed": [row for row in rows if row.bed == bed] for bed in BEDS}
@@ -70,7 +70,7 @@ def pairs(rows: Sequence[Row]) -> dict[str, Any]:
     return {name: _pairs(of) for name, of in groups.items() if of}
 
 
-def _pairs(rows: Sequence[Row]) -> dict[str, Any]:
+def _pairs(rows: Sequence[CaseRow]) -> dict[str, Any]:
     nothing = [row for row in rows if not row.truth and row.verdict != "failed"]
     listed = [row for row in rows if row.detectable and row.truth[0] in LISTED]
     strange = [row for row in rows if row.detectable and row.truth[0] not in LISTED]

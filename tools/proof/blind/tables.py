@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gritd.tools.proof.blind.plant.concealed import UNLISTED
-from gritd.tools.proof.blind.verdicts import Row
+from gritd.tools.proof.blind.verdicts import CaseRow
 
 Table = list[tuple[str, ...]]  # rows of cells, all as long as the first
 GAP = "  "
 
 
-def text(score: Mapping[str, Any], rows: Sequence[Row]) -> str:
+def text(score: Mapping[str, Any], rows: Sequence[CaseRow]) -> str:
     """All tables, then what went wrong, case by case."""
     parts = [f"{heading}\n\n{aligned(table)}" for heading, table in all_tables(score).items()]
     wrong = [f"  {row.number:4}  {explained(row)}" for row in rows if missed(row)]
@@ -271,7 +271,7 @@ def _alone(of: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(map(share_text, (*verdicts, *rest)))
 
 
-def missed(row: Row) -> bool:
+def missed(row: CaseRow) -> bool:
     """Not what should have been said: an alarm without cause, or a cause without its name."""
     if row.verdict == "failed":
         return True
@@ -282,7 +282,7 @@ def missed(row: Row) -> bool:
     return not (row.first_right("table") or row.first_right("engine"))
 
 
-def explained(row: Row) -> str:
+def explained(row: CaseRow) -> str:
     """One line: truth and strength, what was said, and why it may be."""
     parts = [
         f"{_truth(row)} → {_spoken(row)}",
@@ -295,7 +295,7 @@ def explained(row: Row) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def _truth(row: Row) -> str:
+def _truth(row: CaseRow) -> str:
     truth = " + ".join(row.truth) or "none"
     strength = f" {row.level} D={row.detectability:.0f}" if row.truth else f" {row.level}".rstrip()
     where = f" in {row.world}" if row.stratum in ("foreign", "pair") else ""
@@ -303,5 +303,5 @@ def _truth(row: Row) -> str:
     return f"{truth}{strength}{where}{new}"
 
 
-def _spoken(row: Row) -> str:
+def _spoken(row: CaseRow) -> str:
     return f"{row.spoken} p={row.first.probability:.2f}" if row.first else row.spoken

@@ -28,7 +28,7 @@ GIVEN, RESULT, OUTCOME = "given", "result.json", "outcome.json"
 
 
 @dataclass(frozen=True)
-class Spec:
+class WorkerSpec:
     """What a worker needs to know. The folder must be one that all workers see."""
 
     number: int
@@ -59,7 +59,7 @@ class Spec:
         return (self.folder / OUTCOME).exists()
 
 
-def prepare(spec: Spec) -> str:
+def prepare(spec: WorkerSpec) -> str:
     """Draw the case, write what is handed over, seal the answers; returns the seal. A finished step
     is not redone.
     """
@@ -76,7 +76,7 @@ def prepare(spec: Spec) -> str:
     return sealed
 
 
-def _truth(spec: Spec, judged: handover.Driven) -> dict[str, str]:
+def _truth(spec: WorkerSpec, judged: handover.DrivenCampaign) -> dict[str, str]:
     """The noiseless channels, beside the answers; hashes by file name."""
     spec.answers.parent.mkdir(parents=True, exist_ok=True)
     hashes = {}
@@ -87,7 +87,7 @@ def _truth(spec: Spec, judged: handover.Driven) -> dict[str, str]:
     return hashes
 
 
-def diagnose(spec: Spec) -> dict[str, Any]:
+def diagnose(spec: WorkerSpec) -> dict[str, Any]:
     """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed
     over.
     """
@@ -103,7 +103,7 @@ def diagnose(spec: Spec) -> dict[str, Any]:
     return outcome
 
 
-def _command(spec: Spec) -> list[str]:
+def _command(spec: WorkerSpec) -> list[str]:
     """What an engineer would type in the folder of what was handed over."""
     result = str((spec.folder / RESULT).resolve())
     told = ["--config", handover.CONFIGURATION, "--json", result]
@@ -115,7 +115,7 @@ def _command(spec: Spec) -> list[str]:
     return [*spec.diagnose, *_recordings(spec, handover.NEW), *before, *told]
 
 
-def _recordings(spec: Spec, folder: str) -> list[str]:
+def _recordings(spec: WorkerSpec, folder: str) -> list[str]:
     given = spec.folder / GIVEN
     return sorted(str(path.relative_to(given)) for path in (given / folder).glob("*.mcap"))
 

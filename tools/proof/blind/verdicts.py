@@ -17,7 +17,7 @@ from gritd.tools.proof.blind import heldout, seal
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD
 from gritd.tools.proof.blind.strata import LEVELS
-from gritd.tools.proof.blind.trial import OUTCOME, RESULT, Spec
+from gritd.tools.proof.blind.trial import OUTCOME, RESULT, WorkerSpec
 
 NOTHING, UNLISTED, INSUFFICIENT, FAILED = "(nothing)", "(unlisted)", "(insufficient)", "(failed)"
 DETECTABLE = 0.9 * LEVELS["weak"]  # times the detection limit
@@ -25,7 +25,7 @@ SPOKEN = {"consistent": NOTHING, "unlisted": UNLISTED, "insufficient": INSUFFICI
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class StatedHypothesis:
     """One hypothesis as stated."""
 
     effect: str
@@ -36,7 +36,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Row:
+class CaseRow:
     """One case: truth, verdict, and what can be measured of it. NaN where it cannot."""
 
     number: int
@@ -51,7 +51,7 @@ class Row:
     inseparable: frozenset[str]  # by the plant: rivals this campaign cannot tell from the truth
     noise_factor: float
     verdict: str
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[StatedHypothesis, ...]
     seconds: float
     note: str
     # c, tan_phi: relative error, and error over sigma, before and after; NaN: said to be unknown
@@ -75,7 +75,7 @@ class Row:
         return bool(self.truth) and self.detectability >= DETECTABLE * self.limit
 
     @property
-    def accepted(self) -> tuple[Hypothesis, ...]:
+    def accepted(self) -> tuple[StatedHypothesis, ...]:
         """What it says is there, first names first."""
         if self.verdict != "explained":
             return ()
@@ -86,7 +86,7 @@ class Row:
         return self.verdict in ("explained", "unlisted")
 
     @property
-    def first(self) -> Hypothesis | None:
+    def first(self) -> StatedHypothesis | None:
         return self.hypotheses[0] if self.verdict == "explained" and self.hypotheses else None
 
     @property
@@ -105,7 +105,7 @@ class Row:
             return name in true or name in self.inseparable
         return name in true
 
-    def name_right(self, name: Hypothesis, by: str = "name") -> bool:
+    def name_right(self, name: StatedHypothesis, by: str = "name") -> bool:
         """The same of a hypothesis; by `engine`, whether a true one is in its stated group."""
         if by == "engine":
             return bool(name.group & self.held.union(self.truth))
@@ -146,13 +146,13 @@ class Row:
         return float(np.exp(np.mean(np.log(ratios)))) if ratios else math.nan
 
 
-def row(spec: Spec) -> Row:
+def row(spec: WorkerSpec) -> CaseRow:
     """Open the answers, check their seal, and read what was said. Raises CommandError."""
     answers = seal.opened(spec.answers, spec.seal.read_text(encoding="utf-8").strip())
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
     result, trouble = _result(spec.folder / RESULT, outcome)
 
-    return Row(
+    return CaseRow(
         number=spec.number,
         stratum=answers["stratum"],
         level=answers["level"],
@@ -185,10 +185,10 @@ def _result(path: Path, outcome: Mapping[str, Any]) -> tuple[dict[str, Any], str
     return (result, "") if isinstance(result, dict) else ({}, "result is no mapping")
 
 
-def _hypotheses(result: Mapping[str, Any]) -> tuple[Hypothesis, ...]:
+def _hypotheses(result: Mapping[str, Any]) -> tuple[StatedHypothesis, ...]:
     """As listed: what was accepted first, then by probability."""
     hypotheses = [
-        Hypothesis(
+        StatedHypothesis(
             str(h["effect"]),
             float(h.get("probability") or 0.0),
             frozenset((str(h["effect"]), *h.get("indistinguishable_from", ()))),

@@ -9,7 +9,7 @@ from scipy.linalg import solve_triangular, toeplitz
 
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt
-from gritd.tools.proof.blind.plant.sensors import Chain, Converter
+from gritd.tools.proof.blind.plant.sensors import Converter, SensorChain
 
 RATE = 5.0  # [Hz]
 FLOOR, FLOOR_TIME = 0.003, 1.0  # of the channel's root mean square; [s]
@@ -72,7 +72,7 @@ def held_out(sizes: Sequence[int]) -> list[tuple[int, Array]]:
     return [(0, third == part) for part in range(3)]
 
 
-def noise_roots(chain: Chain, felt: Felt) -> dict[str, Array]:
+def noise_roots(chain: SensorChain, felt: Felt) -> dict[str, Array]:
     """Cholesky factor of each channel's noise covariance at RATE, in SI (n, n)."""
     converters = {c.channel: c for c in (*chain.converters, *(chain.wrench or ()))}
     read = channels(felt, chain.wrench is not None)

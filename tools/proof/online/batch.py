@@ -20,18 +20,18 @@ from gritd.tools.proof.online.judge import Score, handed_over, scored
 ANSWERS = "answers.json"
 
 
-class Spec(NamedTuple):
+class BatchSpec(NamedTuple):
     stratum: str
     seed: int
 
 
-def specs(count: int, strata: Sequence[str], seed: int | None) -> list[Spec]:
+def specs(count: int, strata: Sequence[str], seed: int | None) -> list[BatchSpec]:
     """Benches in turn over the strata; without a seed nobody can foretell them."""
     first = secrets.randbits(40) if seed is None else seed
-    return [Spec(strata[n % len(strata)], first + n) for n in range(count)]
+    return [BatchSpec(strata[n % len(strata)], first + n) for n in range(count)]
 
 
-def sealed(chosen: Sequence[Spec], folder: Path) -> str:
+def sealed(chosen: Sequence[BatchSpec], folder: Path) -> str:
     """Write the answers; their hash."""
     answers: dict[str, Any] = {
         f"{spec.stratum}-{spec.seed}": _plain(asdict(drawn(*spec))) for spec in chosen
@@ -48,7 +48,7 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, np.floating) else value
 
 
-def run(chosen: Sequence[Spec], jobs: int, advance: Callable[[], None]) -> list[Score]:
+def run(chosen: Sequence[BatchSpec], jobs: int, advance: Callable[[], None]) -> list[Score]:
     """All scores, in the order of the specs."""
     with ProcessPoolExecutor(jobs) as executor:
         found = []
@@ -58,7 +58,7 @@ def run(chosen: Sequence[Spec], jobs: int, advance: Callable[[], None]) -> list[
     return found
 
 
-def one(spec: Spec) -> Score:
+def one(spec: BatchSpec) -> Score:
     bench = drawn(*spec)
     with TemporaryDirectory() as place:
         folder = Path(place) / "bench"
@@ -127,4 +127,4 @@ def _summary(scores: Sequence[Score]) -> Iterator[str]:
     yield f"Something left out: not believed, or within 3σ, {len(right)} of {len(out)}."
 
 
-__all__ = ["Spec", "one", "run", "sealed", "specs", "table"]
+__all__ = ["BatchSpec", "one", "run", "sealed", "specs", "table"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from gritd.tools.proof.blind.knowledge import ground_drawn
 from gritd.tools.proof.blind.plant.axle import balance
-from gritd.tools.proof.blind.plant.contact import Ground, Rim, reaction
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim, reaction
 from gritd.tools.proof.blind.plant.quadrature import Array
 
 STRATA = (
@@ -37,7 +37,7 @@ SLIPS = (0.08, 0.15, 0.25, 0.4, 0.55)
 CHANGE = (0.2, 0.06)  # most that c and tan φ change by, relative
 
 
-class Noise(NamedTuple):
+class ReadingNoise(NamedTuple):
     """Standard deviation of one reading, SI."""
 
     angle: float
@@ -47,7 +47,7 @@ class Noise(NamedTuple):
     torque: float
 
 
-class Course(NamedTuple):
+class SoilChange(NamedTuple):
     """How the soil changes in a run: from `begin` to `end` [s] c and tan φ reach these factors, or,
     of a patch, have them in between.
     """
@@ -59,7 +59,7 @@ class Course(NamedTuple):
     end: float
 
 
-class Part(NamedTuple):
+class RunPart(NamedTuple):
     """A stretch of a run."""
 
     duration: float  # [s]
@@ -67,9 +67,9 @@ class Part(NamedTuple):
     slip: float
 
 
-class Run(NamedTuple):
-    parts: tuple[Part, ...]
-    course: Course | None = None
+class DrawnRun(NamedTuple):
+    parts: tuple[RunPart, ...]
+    course: SoilChange | None = None
 
     @property
     def duration(self) -> float:
@@ -85,18 +85,18 @@ class Bench:
     family: str
     radius: float  # [m]
     width: float  # [m]
-    ground: Ground
+    ground: PlantSoil
     c1: float
     c2: float
     rate: float  # of the table [Hz]
     lag: float  # [s] by which forces follow
     speed: float  # of the carriage [m/s]
-    noise: Noise
+    noise: ReadingNoise
     motor: bool  # the torque is the motor's
     weighed: bool  # the load is stated of the run, and not measured
     pull: bool  # the drawbar pull is measured
     left_out: float  # [N·m], share of the load, or share: of the stratum's effect
-    runs: tuple[Run, ...]
+    runs: tuple[DrawnRun, ...]
 
 
 def drawn(stratum: str, seed: int) -> Bench:
@@ -121,7 +121,7 @@ def _attempt(stratum: str, seed: int, rng: np.random.Generator) -> Bench | None:
 
     heaviest = loads[-1]
     force = float(rng.uniform(0.003, 0.008)) * heaviest
-    noise = Noise(
+    noise = ReadingNoise(
         float(np.radians(rng.choice((0.01, 0.02, 0.05)))),
         float(rng.choice((1e-5, 2e-5, 5e-5))),
         float(rng.uniform(0.05e-3, 0.15e-3)),
@@ -152,7 +152,7 @@ def _attempt(stratum: str, seed: int, rng: np.random.Generator) -> Bench | None:
 
 
 def _loads(
-    ground: Ground, radius: float, width: float, c1: float, c2: float, rng: np.random.Generator
+    ground: PlantSoil, radius: float, width: float, c1: float, c2: float, rng: np.random.Generator
 ) -> list[float] | None:
     """Six loads [N], rising; None where no testbed would drive them."""
     rim = Rim(peak=c1 + 0.3 * c2)
@@ -179,20 +179,20 @@ def _left_out(stratum: str, heaviest: float, radius: float, rng: np.random.Gener
     return float(rng.uniform(0.02, 0.06)) if stratum == "wall" else 0.0
 
 
-def _runs(stratum: str, loads: list[float], rng: np.random.Generator) -> tuple[Run, ...]:
+def _runs(stratum: str, loads: list[float], rng: np.random.Generator) -> tuple[DrawnRun, ...]:
     if stratum in CHANGES:
         return (_changing(stratum, loads, rng),)
 
     count = int(rng.integers(2, 4)) if stratum == "few" else 6
     chosen = loads if count == 6 else [loads[0], loads[-1], loads[2]][:count]
-    return tuple([Run(_parts(load, 6.4, rng)) for load in chosen])
+    return tuple([DrawnRun(_parts(load, 6.4, rng)) for load in chosen])
 
 
-def _parts(load: float, duration: float, rng: np.random.Generator) -> tuple[Part, ...]:
-    return tuple([Part(duration, load, float(slip)) for slip in rng.permutation(SLIPS)])
+def _parts(load: float, duration: float, rng: np.random.Generator) -> tuple[RunPart, ...]:
+    return tuple([RunPart(duration, load, float(slip)) for slip in rng.permutation(SLIPS)])
 
 
-def _changing(stratum: str, loads: list[float], rng: np.random.Generator) -> Run:
+def _changing(stratum: str, loads: list[float], rng: np.random.Generator) -> DrawnRun:
     """A long run under one load or several, in which the soil changes once."""
     several = bool(rng.random() < 0.7)
     chosen = rng.choice(loads, 3, replace=False) if several else np.full(3, rng.choice(loads))
@@ -201,4 +201,4 @@ def _changing(stratum: str, loads: list[float], rng: np.random.Generator) -> Run
     begin = float(rng.uniform(60.0, 80.0))
     seconds = {"step": 0.0, "ramp": 20.0, "patch": float(rng.uniform(8.0, 20.0))}[stratum]
     cohesion, tan_phi = (float(1.0 + rng.uniform(-most, most)) for most in CHANGE)
-    return Run(tuple(parts), Course(stratum, cohesion, tan_phi, begin, begin + seconds))
+    return DrawnRun(tuple(parts), SoilChange(stratum, cohesion, tan_phi, begin, begin + seconds))

@@ -8,20 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.tools.proof.blind.plant.bed import EquationBed
-from gritd.tools.proof.blind.plant.contact import Ground, Rim
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.respond import World, responses
-from gritd.tools.proof.blind.plant.scene import Felt, Motion, Rig, Scene
+from gritd.tools.proof.blind.plant.scene import Felt, Scene, TrueMotion, TrueRig
 from gritd.tools.proof.blind.plant.servo import Servo, summed
-from gritd.tools.proof.online.draw import Bench, Course, Run
+from gritd.tools.proof.online.draw import Bench, DrawnRun, SoilChange
 
 STILL, CHANGING = 1.0, 0.8  # [s] before a run begins to move; between two stretches
 FINEST = 100.0  # [Hz] at which the plant is solved at least
 
 
 @dataclass(frozen=True)
-class Peak(Effect):
+class Peak(PlantEffect):
     """θₘ/θ₁ = c₁ + c₂ i, Eq. (5)."""
 
     c1: float = 0.5
@@ -32,12 +32,12 @@ class Peak(Effect):
 
 
 @dataclass(frozen=True)
-class Changing(Effect):
+class Changing(PlantEffect):
     """c and tan φ along the course of a run."""
 
-    course: Course | None = None
+    course: SoilChange | None = None
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         course = self.course
         if course is None:
             return ground
@@ -49,7 +49,7 @@ class Changing(Effect):
         )
 
 
-def share(course: Course, time: Array) -> Array:
+def share(course: SoilChange, time: Array) -> Array:
     """How much of the change is there (n,), 0 … 1."""
     if course.kind == "ramp":
         return np.clip((time - course.begin) / (course.end - course.begin), 0.0, 1.0)
@@ -57,7 +57,7 @@ def share(course: Course, time: Array) -> Array:
     return (after if course.kind == "step" else after & (time < course.end)).astype(float)
 
 
-class Columns(NamedTuple):
+class SimulatedTable(NamedTuple):
     """One table, arrays (n,), SI; noise included."""
 
     time: Array
@@ -69,7 +69,7 @@ class Columns(NamedTuple):
     torque: Array
 
 
-def driven(bench: Bench) -> list[Columns]:
+def driven(bench: Bench) -> list[SimulatedTable]:
     """The tables of all runs."""
     rng = np.random.default_rng((bench.seed, 77))
     felt = responses(
@@ -78,14 +78,14 @@ def driven(bench: Bench) -> list[Columns]:
     return [_read(bench, one, number, rng) for number, one in enumerate(felt)]
 
 
-def _world(bench: Bench, run: Run) -> World:
+def _world(bench: Bench, run: DrawnRun) -> World:
     idle = Servo(1.0, 1.0, 1.0)
-    rig = Rig(bench.radius, bench.width, 1.0, idle, idle, 0.01)
+    rig = TrueRig(bench.radius, bench.width, 1.0, idle, idle, 0.01)
     effects = (Peak(1.0, bench.c1, bench.c2), Changing(1.0, run.course))
     return World(rig, bench.ground, effects, EquationBed())
 
 
-def _motion(bench: Bench, run: Run) -> Motion:
+def _motion(bench: Bench, run: DrawnRun) -> TrueMotion:
     """The carriage keeps its speed; the wheel turns faster by the slip that is ordered."""
     rate = bench.rate * max(1, round(FINEST / bench.rate))
     time = np.arange(round(run.duration * rate)) / rate
@@ -97,10 +97,10 @@ def _motion(bench: Bench, run: Run) -> Motion:
     speed = bench.speed * moving
     omega = speed / (1.0 - slip) / bench.radius
     step = 1.0 / rate
-    return Motion(time, summed(omega, step), omega, summed(speed, step), speed, load, 1)
+    return TrueMotion(time, summed(omega, step), omega, summed(speed, step), speed, load, 1)
 
 
-def _levels(run: Run, time: Array, levels: list[float]) -> Array:
+def _levels(run: DrawnRun, time: Array, levels: list[float]) -> Array:
     values, edge = np.full(time.size, levels[0]), 0.0
     for before, after, part in zip(levels[:-1], levels[1:], run.parts[:-1], strict=True):
         edge += part.duration
@@ -109,7 +109,7 @@ def _levels(run: Run, time: Array, levels: list[float]) -> Array:
     return values
 
 
-def _read(bench: Bench, felt: Felt, number: int, rng: np.random.Generator) -> Columns:
+def _read(bench: Bench, felt: Felt, number: int, rng: np.random.Generator) -> SimulatedTable:
     motion = felt.scene.motion
     every = round(1.0 / (motion.step * bench.rate))
     pull, load, torque = (
@@ -136,7 +136,7 @@ def _read(bench: Bench, felt: Felt, number: int, rng: np.random.Generator) -> Co
         (load, noise.force),
         (torque, noise.torque),
     )
-    return Columns(
+    return SimulatedTable(
         *[
             values[::every] + sigma * rng.standard_normal(values[::every].size)
             for values, sigma in columns

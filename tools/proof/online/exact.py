@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground, Rim, reaction
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim, reaction
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.online.draw import Bench
-from gritd.tools.proof.online.drive import CHANGING, STILL, Columns
+from gritd.tools.proof.online.drive import CHANGING, STILL, SimulatedTable
 
 STEP = 1e-4
 PRIOR = (1000.0, 0.15, 0.5)  # σ of c [Pa], tan φ and ln k in the template of an import
 
 
-class Steady(NamedTuple):
+class SteadyCondition(NamedTuple):
     """One condition: means over so many rows, SI."""
 
     theta_1: float
@@ -27,7 +27,7 @@ class Steady(NamedTuple):
     seconds: float
 
 
-def sigma_of_c(bench: Bench, tables: list[Columns]) -> float:
+def sigma_of_c(bench: Bench, tables: list[SimulatedTable]) -> float:
     """[Pa]."""
     information = np.diag(np.square(1.0 / np.array(PRIOR)))
     for run, table in zip(bench.runs, tables, strict=True):
@@ -41,14 +41,14 @@ def sigma_of_c(bench: Bench, tables: list[Columns]) -> float:
 
 
 def _steady(
-    bench: Bench, table: Columns, begin: float, duration: float, slip: float
-) -> Steady | None:
+    bench: Bench, table: SimulatedTable, begin: float, duration: float, slip: float
+) -> SteadyCondition | None:
     end = begin + duration - CHANGING - 3.0 * bench.lag - 0.2
     inside = (table.time >= begin) & (table.time < end)
     if np.count_nonzero(inside) < 3:
         return None
     depth = float(table.sinkage[inside].mean())
-    return Steady(
+    return SteadyCondition(
         float(np.arccos(1.0 - depth / bench.radius)),
         slip,
         float(table.load[inside].mean()),
@@ -57,7 +57,7 @@ def _steady(
     )
 
 
-def _information(bench: Bench, at: Steady) -> Array:
+def _information(bench: Bench, at: SteadyCondition) -> Array:
     ground = bench.ground
     x = np.array([ground.cohesion, ground.tan_phi, np.log(ground.shear_modulus)])
     J = _slopes(lambda y: _forces(bench, y, at), x)
@@ -81,14 +81,14 @@ def _information(bench: Bench, at: Steady) -> Array:
     return np.asarray(J.T @ np.linalg.solve(R, J))
 
 
-def _forces(bench: Bench, x: Array, at: Steady) -> Array:
+def _forces(bench: Bench, x: Array, at: SteadyCondition) -> Array:
     """Torque and drawbar pull (2,) under the load: stresses are linear in c and in K."""
     c, tan_phi, k = float(x[0]), float(x[1]), float(np.exp(x[2]))
     n, rim = bench.ground.exponent, Rim(peak=bench.c1 + bench.c2 * at.slip)
 
     def of(cohesion: float, modulus: float) -> Array:
         felt = reaction(
-            Ground(cohesion, tan_phi, k, n, modulus),
+            PlantSoil(cohesion, tan_phi, k, n, modulus),
             rim,
             bench.radius,
             bench.width,

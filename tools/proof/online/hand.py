@@ -10,13 +10,13 @@ import yaml
 
 from gritd.config import packaged
 from gritd.tools.proof.online.draw import Bench
-from gritd.tools.proof.online.drive import Columns
+from gritd.tools.proof.online.drive import SimulatedTable
 
 MAP, CONFIGURATION = "map.yaml", "stated.yaml"
 DIGITS = {"time": 4, "wheel": 4, "carriage": 4, "sinkage": 4, "pull": 4, "load": 4, "torque": 5}
 
 
-def write(bench: Bench, tables: list[Columns], folder: Path) -> None:
+def write(bench: Bench, tables: list[SimulatedTable], folder: Path) -> None:
     """run_1.csv …, map.yaml, and stated.yaml where something is stated, in a new folder."""
     folder.mkdir(parents=True)
     for number, table in enumerate(tables, 1):
@@ -26,7 +26,7 @@ def write(bench: Bench, tables: list[Columns], folder: Path) -> None:
         (folder / CONFIGURATION).write_text(_stated(bench), encoding="utf-8")
 
 
-def _write_table(bench: Bench, table: Columns, path: Path) -> None:
+def _write_table(bench: Bench, table: SimulatedTable, path: Path) -> None:
     columns = {
         "time": table.time,
         "wheel": np.degrees(table.angle),

@@ -22,7 +22,7 @@ from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.tools.cli.command import FAILED, CommandError
-from gritd.tools.proof.online.draw import CHANGES, Bench, Course
+from gritd.tools.proof.online.draw import CHANGES, Bench, SoilChange
 from gritd.tools.proof.online.drive import driven, share
 from gritd.tools.proof.online.exact import sigma_of_c
 from gritd.tools.proof.online.hand import CONFIGURATION, MAP, write
@@ -135,7 +135,7 @@ def _first(rows: Any, time: Any) -> float:
     return float(time[int(np.argmax(narrow))]) if narrow.any() else inf
 
 
-def _silent(bench: Bench, course: Course, rows: Any, time: Any) -> float:
+def _silent(bench: Bench, course: SoilChange, rows: Any, time: Any) -> float:
     """Share of the driving time after the change beyond 3σ without a flag."""
     done = share(course, time)
     c = bench.ground.cohesion * (1.0 + (course.cohesion - 1.0) * done)

@@ -39,7 +39,7 @@ OTHERS = 30  # names among which a lapse spreads
 
 
 @dataclass(frozen=True)
-class Case:
+class WeighedCase:
     """The explanations of one case, and how much of each is true (k,)."""
 
     evidence: Array  # [nats]
@@ -55,13 +55,13 @@ def case_of(
     unlisted: bool,
     candidates: int,
     held: Collection[str] = (),
-) -> Case:
+) -> WeighedCase:
     """From the explanations of a diagnosis and the effects that were at work; held: names that are
     true of the rig itself, which are neither asked for nor wrong.
     """
     right = [_true(w["names"], [] if unlisted else truth, held) for w in weighed]
 
-    return Case(
+    return WeighedCase(
         np.array([w["evidence"] for w in weighed]),
         np.array([len(w["names"]) for w in weighed]),
         np.array([float(w["nameless"]) for w in weighed]),
@@ -83,7 +83,7 @@ def _true(names: Sequence[str], truth: Sequence[str], held: Collection[str]) -> 
     return len(named & asked) / len(named | asked)
 
 
-def log_truth(case: Case, by: Calibration) -> float:
+def log_truth(case: WeighedCase, by: Calibration) -> float:
     """Log probability of the truth of a case."""
     weight = replace(by, candidates=case.candidates).weights(
         case.evidence, case.count, case.nameless
@@ -98,7 +98,7 @@ def calibration(x: Array) -> Calibration:
     return Calibration(float(np.exp(temperature)), listed, more, nameless, float(expit(lapse)))
 
 
-def learn(cases: Sequence[Case]) -> tuple[Calibration, float]:
+def learn(cases: Sequence[WeighedCase]) -> tuple[Calibration, float]:
     """The calibration, and its mean log score over the cases [nats]."""
 
     def loss(x: Array) -> float:
@@ -112,7 +112,7 @@ def learn(cases: Sequence[Case]) -> tuple[Calibration, float]:
 # ---- where cases come from ---------------------------------------------------------------------
 
 
-def read(folder: Path, pairs: bool = False) -> list[Case]:
+def read(folder: Path, pairs: bool = False) -> list[WeighedCase]:
     """The cases of an opened batch that alarmed: the others say nothing of names. A campaign alone
     counts where it alarmed rightly. pairs: the pairs instead of the campaigns alone.
     """

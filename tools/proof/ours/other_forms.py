@@ -26,7 +26,7 @@ class Cousin(Effect):
 
 
 @dataclass(frozen=True)
-class LorentzStribeck(Cousin):
+class HessSoomFriction(Cousin):
     """Break-away friction as T_S/(1 + (ω/ω_S)²) (Hess and Soom 1990)."""
 
     size: float = _size(0.6)

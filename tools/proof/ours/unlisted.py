@@ -29,7 +29,7 @@ class BentRail(Effect):
 
 
 @dataclass(frozen=True)
-class CableDrag(Effect):
+class CableChainDrag(Effect):
     """A cable pulls back more the farther the carriage is."""
 
     size: float = _size(3.0)
@@ -57,7 +57,7 @@ class NextDoor(Effect):
 
 
 @dataclass(frozen=True)
-class RailJoint(Effect):
+class RailJointDrag(Effect):
     """Beyond a joint of the rails the carriage drags."""
 
     size: float = _size(1.5)

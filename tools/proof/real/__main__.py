@@ -15,7 +15,7 @@ from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.progress import Progress
 from gritd.tools.proof.real import chrono, cmu, ding, emps, figure, mgst
-from gritd.tools.proof.real.bench import ROOT, Bench
+from gritd.tools.proof.real.bench import ROOT, CommandBench
 from gritd.tools.proof.real.page import page, section
 from gritd.tools.proof.real.proof import Finding, Proof
 
@@ -66,7 +66,7 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
     with tempfile.TemporaryDirectory(prefix="gritd-proof-") as work, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         with Progress(f"{place}, {proof.name}") as progress:
-            finding = proof.run(bench := Bench(data.resolve(), Path(work), progress.at))
+            finding = proof.run(bench := CommandBench(data.resolve(), Path(work), progress.at))
 
     seconds = time.monotonic() - began
     _tell(proof, finding, seconds)

@@ -47,7 +47,7 @@ class DiagnosisRun:
 
 
 @dataclass
-class Bench:
+class CommandBench:
     """Runs commands in `folder`; `data` holds the public files, a folder a rig."""
 
     data: Path

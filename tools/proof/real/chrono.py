@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 RUNS = 6
 COHESION, TAN_PHI = 1000.0, 0.577  # [Pa], [-] of the simulator
@@ -29,7 +29,7 @@ CHANNELS = {
 LABELS = ("lugs, as simulated", "as configured", "with what --apply wrote")
 
 
-def _run(bench: Bench) -> Finding:
+def _run(bench: CommandBench) -> Finding:
     folder = bench.imported("chrono", "chrono", files=["chrono"])
     base = [folder / f"base-{n}.mcap" for n in range(RUNS)]
     lugs = [folder / f"lugs-{n}.mcap" for n in range(RUNS)]
@@ -46,7 +46,7 @@ def _run(bench: Bench) -> Finding:
     return Finding(diagnoses, _checks(nothing, lugged, patched), _table(diagnoses), panels)
 
 
-def _patched(bench: Bench) -> list[Path]:
+def _patched(bench: CommandBench) -> list[Path]:
     """Recordings of the base campaign with more torque and pull beyond a place of the bed."""
     raw = bench.folder / "patch-logs"
     raw.mkdir()
@@ -83,14 +83,14 @@ def _panels(recording: Path, configuration: Path, applied: Path) -> list[Panel]:
     return panels
 
 
-def _table(diagnoses: list[DiagnosisRun]) -> Table:
+def _table(diagnoses: list[DiagnosisRun]) -> FigureTable:
     news = ("nothing", f"{LUGS} lugs of 4 mm", "torque +10 %, pull +20 % beyond 0.45 m")
     rows = []
     for new, diagnosis in zip(news, diagnoses, strict=True):
         names = [f"{n} {h['probability']:.2f}" for n, h in diagnosis.accepted.items()]
         soil = (_stated(diagnosis, name) for name in ("c", "tan_phi"))
         rows.append([new, diagnosis.result["verdict"], listed(names) or "none", *soil])
-    return Table(("new", "verdict", "names", "c [Pa]", "tan φ"), rows)
+    return FigureTable(("new", "verdict", "names", "c [Pa]", "tan φ"), rows)
 
 
 def _stated(diagnosis: DiagnosisRun, name: str) -> str:

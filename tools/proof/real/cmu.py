@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
 FIT, HELD = ("10", "20", "100"), ("12", "40")
@@ -32,7 +32,7 @@ PLATE, DEPTHS = (
 )  # [m] plate nearest to the wheel's width; [mm] over which the moduli are fitted
 
 
-def _run(bench: Bench) -> Finding:
+def _run(bench: CommandBench) -> Finding:
     smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
     of_smooth = list((smooth / "smooth-table").glob("*.mcap"))
     first = bench.diagnosis(of_smooth, smooth / "cmu.yaml", "cmu-smooth")
@@ -68,7 +68,7 @@ def _run(bench: Bench) -> Finding:
     return Finding(
         [first, second],
         _checks(first, second, unseen, smooth / "penetration.csv"),
-        Table(heads, rows),
+        FigureTable(heads, rows),
         panels,
     )
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
 NEW = "With the smooth wheel as reference, does it name what the other wheel has?"
@@ -22,7 +22,7 @@ LABELS = ("measured", "soil as fitted, no effect", "with what was found")
 SIGMAS = 2.0
 
 
-def _run(bench: Bench) -> Finding:
+def _run(bench: CommandBench) -> Finding:
     folder = bench.imported("table", "ding", files=["ding"])
     recordings, lugged = [folder / "ding2011_smooth.mcap"], [folder / "ding2011_lug10.mcap"]
     configuration = folder / "ding2011_smooth.yaml"
@@ -50,7 +50,7 @@ def _run(bench: Bench) -> Finding:
     return Finding([diagnosis, lugs], _checks(diagnosis, lugs), _table(columns), panels)
 
 
-def _table(columns: list[Array]) -> Table:
+def _table(columns: list[Array]) -> FigureTable:
     """Every point as measured, by the published soil, by the fitted one, and with effects; then the
     errors.
     """
@@ -65,7 +65,7 @@ def _table(columns: list[Array]) -> Table:
     )
 
     four = "measured / soil as published / as fitted, no effect / with what was found"
-    return Table((f"slip; {four}", *(label for label, _ in CHANNELS.values())), rows)
+    return FigureTable((f"slip; {four}", *(label for label, _ in CHANNELS.values())), rows)
 
 
 def _four(values: Array) -> str:

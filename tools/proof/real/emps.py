@@ -13,8 +13,8 @@ from scipy.signal import butter, sosfiltfilt
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording import salvage
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 PUBLISHED = {"M": (95.11, "kg"), "Fv": (203.5, "N·s/m"), "Fc": (20.39, "N")}
 WITHIN = 0.03
@@ -24,7 +24,7 @@ FAST = 0.035  # [m/s] above which a second regression is made
 SPAN = (2.0, 9.0)  # [s] that are drawn
 
 
-def _run(bench: Bench) -> Finding:
+def _run(bench: CommandBench) -> Finding:
     folder = bench.imported("emps", "emps", files=["emps"])
     diagnosis = bench.diagnosis([folder / "data-emps.mcap"], folder / "emps.yaml", "emps-data")
     fitted, unseen = (_regression(folder / f"data-emps{name}.mcap") for name in ("", "-pulses"))
@@ -71,7 +71,7 @@ def _run(bench: Bench) -> Finding:
     )
 
     checks = _checks(diagnosis, identified, unseen.error(bare), unseen.error(identified))
-    return Finding([diagnosis], checks, Table(heads, rows), [panel])
+    return Finding([diagnosis], checks, FigureTable(heads, rows), [panel])
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 BEGIN = (
     "--begin",
@@ -40,7 +40,7 @@ DRAGS = ("side_wall_rubbing", "bed_slope", "force_crosstalk")
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldOutTrial:
     """One trial judged by a diagnosis that did not see it: concealed channel, as read, and freed of
     effects, (n,).
     """
@@ -67,10 +67,10 @@ class Hidden:
     read: str
     true: str
     unit: str
-    ask: Callable[[DiagnosisRun, Sequence[Held]], list[Check]]
+    ask: Callable[[DiagnosisRun, Sequence[HeldOutTrial]], list[Check]]
 
 
-def _run(hidden: Hidden, bench: Bench) -> Finding:
+def _run(hidden: Hidden, bench: CommandBench) -> Finding:
     seen = bench.imported("mgst", hidden.name, *hidden.arguments, *BEGIN, files=["mgst"])
     whole = bench.imported("mgst", "judge", *BEGIN, files=["mgst"])
     trials = sorted(seen.glob("*.mcap"))
@@ -105,12 +105,12 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
         for h in (held[n] for n in DRAWN)
     ]
 
-    return Finding([diagnosis], hidden.ask(diagnosis, held), Table(heads, rows), panels)
+    return Finding([diagnosis], hidden.ask(diagnosis, held), FigureTable(heads, rows), panels)
 
 
 def _held(
-    hidden: Hidden, bench: Bench, trials: Sequence[Path], fold: Sequence[int], whole: Path
-) -> list[Held]:
+    hidden: Hidden, bench: CommandBench, trials: Sequence[Path], fold: Sequence[int], whole: Path
+) -> list[HeldOutTrial]:
     configuration = trials[0].parent / "mgst.yaml"
     others = [t for n, t in enumerate(trials) if n not in fold]
 
@@ -127,7 +127,7 @@ def _held(
     freed = reads.freed(diagnosis.result, hidden.read)
 
     return [
-        Held(
+        HeldOutTrial(
             t.stem,
             judge.time(n),
             judge.measured(n, hidden.true),
@@ -156,7 +156,7 @@ def _names(diagnosis: DiagnosisRun, what: str, wanted: Sequence[str], reason: st
     )
 
 
-def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str, reason: str) -> Check:
+def _nearer(diagnosis: DiagnosisRun, held: Sequence[HeldOutTrial], unit: str, reason: str) -> Check:
     before, after = (rms(np.array(e)) for e in zip(*(h.errors for h in held), strict=True))
     better = sum(h.errors[1] < h.errors[0] for h in held)
 
@@ -190,7 +190,7 @@ LOST: Mapping[
 }
 
 
-def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
+def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[HeldOutTrial]) -> list[Check]:
     loss = sum(LOST[n](diagnosis.values(n)) for n in diagnosis.accepted if n in LOST)
     answer = f"{loss:.2f} N·m" if loss else "none"
 
@@ -249,7 +249,7 @@ DRIVETRAIN = Proof(
 # --- the side wall ---
 
 
-def _of_wall(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
+def _of_wall(diagnosis: DiagnosisRun, held: Sequence[HeldOutTrial]) -> list[Check]:
     taken = float(np.mean([np.nanmean(h.freed - h.read) for h in held]))
     question = "How much drawbar pull does it say is taken, on trials that were held out?"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from gritd.tools.proof.real.proof import Check, Finding, Proof, Table
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Proof
 
 BEGIN = "<!-- {name}: from here on written by `make proof` -->\n"
 END = "<!-- {name}: to here -->\n"
@@ -39,7 +39,7 @@ def _lines(
     yield ""
 
     yield from _table(
-        Table(("", "asked", "wanted", "found"), [_row(check) for check in finding.checks])
+        FigureTable(("", "asked", "wanted", "found"), [_row(check) for check in finding.checks])
     )
     yield ""
     yield from _table(finding.table)
@@ -84,7 +84,7 @@ def _row(check: Check) -> tuple[str, str, str, str]:
     return "yes" if check.met else "**no**", check.question, check.wanted, check.answer
 
 
-def _table(table: Table) -> Iterator[str]:
+def _table(table: FigureTable) -> Iterator[str]:
     yield "| " + " | ".join(table.heads) + " |"
     yield "|" + "---|" * len(table.heads)
     for row in table.rows:

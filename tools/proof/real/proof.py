@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Table:
+class FigureTable:
     """Figures: a heading for each column, and rows of text."""
 
     heads: Sequence[str]
@@ -48,7 +48,7 @@ class Panel:
 class Finding:
     diagnoses: Sequence[DiagnosisRun]  # quoted unedited
     checks: Sequence[Check]
-    table: Table
+    table: FigureTable
     panels: Sequence[Panel]
 
 
@@ -61,7 +61,7 @@ class Proof:
     title: str
     concealed: str  # what was kept back, and who judges
     saw: str  # what the tool was given
-    run: Callable[[Bench], Finding]
+    run: Callable[[CommandBench], Finding]
 
 
 def listed(names: Iterable[str]) -> str:

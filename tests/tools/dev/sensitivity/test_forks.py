@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from gritd.estimator.effects import make
-from gritd.tools.dev.sensitivity.forks import Case, Forks, Reading, read_by
+from gritd.tools.dev.sensitivity.forks import BaseDiagnosis, Forks, SensitivityCase, read_by
 from gritd.tools.dev.sensitivity.numbers import Field, changed, named
-from gritd.tools.dev.sensitivity.outcome import Diagnose, Handed, Outcome, decided
+from gritd.tools.dev.sensitivity.outcome import Diagnose, DiagnosisOutcome, Handed, decided
 from gritd.tools.dev.sensitivity.runs import Kept
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.proof.ours.cases import rig_of
@@ -34,7 +34,7 @@ NUMBERS = (
 )
 
 
-def small(folder: Path, handed: Handed) -> Outcome:
+def small(folder: Path, handed: Handed) -> DiagnosisOutcome:
     """One short run with a sinkage datum that is off."""
     acting = (make("sinkage_datum", {"offset": 0.006}),)
     drawn = plan(loads=(60.0,), seconds=6.0, standstill=False, wrench=False)
@@ -49,15 +49,15 @@ def _quick() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def reading() -> Reading:
+def reading() -> BaseDiagnosis:
     return read_by(small, Path("small"))
 
 
 @pytest.fixture(scope="module")
-def forked(reading: Reading, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def forked(reading: BaseDiagnosis, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the children found; None where they ended early."""
     kept = tmp_path_factory.mktemp("forks") / "kept.jsonl"
-    cases = [Case("small", named(number), 2.0) for number in NUMBERS]
+    cases = [SensitivityCase("small", named(number), 2.0) for number in NUMBERS]
     Forks(reading, cases, 2, Kept(kept).keep, math.inf).run(small, Path("small"))
     lines = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()[1:]]
     return {line["number"]: line["after"] for line in lines}
@@ -65,7 +65,7 @@ def forked(reading: Reading, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_fork_ends_as_a_diagnosis_from_the_beginning(
-    number: str, reading: Reading, forked: dict[str, Any]
+    number: str, reading: BaseDiagnosis, forked: dict[str, Any]
 ) -> None:
     of = named(number)
     with replaced(of.room, **{of.name: changed(of.value, of.unit, 2.0)}):
@@ -88,12 +88,12 @@ def test_the_numbers_are_as_they_were(forked: dict[str, Any]) -> None:
 def test_a_child_does_not_end_while_its_number_is_still_read(tmp_path: Path) -> None:
     """The first room hands on the same; the number counts in the second."""
 
-    def late(folder: Path, handed: Handed) -> Outcome:
+    def late(folder: Path, handed: Handed) -> DiagnosisOutcome:
         assert TUNING.search.odds > 0.0
         handed("the same")
         tan_phi = TUNING.search.odds
         handed(tan_phi)
-        return Outcome("consistent", tan_phi=tan_phi, sigma=1.0)
+        return DiagnosisOutcome("consistent", tan_phi=tan_phi, sigma=1.0)
 
     odds = Field("search", "odds")
     (line,) = _kept(tmp_path, late, odds, read_by(late, tmp_path))
@@ -101,10 +101,10 @@ def test_a_child_does_not_end_while_its_number_is_still_read(tmp_path: Path) -> 
 
 
 def test_a_number_that_breaks_a_diagnosis_is_said(tmp_path: Path) -> None:
-    def breaks(folder: Path, handed: Handed) -> Outcome:
+    def breaks(folder: Path, handed: Handed) -> DiagnosisOutcome:
         if TUNING.search.odds > 0.2:
             raise TypeError
-        return Outcome("consistent")
+        return DiagnosisOutcome("consistent")
 
     (line,) = _kept(tmp_path, breaks, Field("search", "odds"))
     assert line["after"]["verdict"] == "failed: TypeError"
@@ -114,7 +114,7 @@ def test_children_end_with_a_run_that_is_interrupted(tmp_path: Path) -> None:
     """The parent stops; its child waits for ever."""
     parent, read, write = os.getpid(), *os.pipe()
 
-    def stops(folder: Path, handed: Handed) -> Outcome:
+    def stops(folder: Path, handed: Handed) -> DiagnosisOutcome:
         assert TUNING.search.odds
         if os.getpid() != parent:
             os.close(read)
@@ -129,10 +129,14 @@ def test_children_end_with_a_run_that_is_interrupted(tmp_path: Path) -> None:
 
 
 def _kept(
-    folder: Path, diagnose: Diagnose, number: Field, reading: Reading | None = None, jobs: int = 1
+    folder: Path,
+    diagnose: Diagnose,
+    number: Field,
+    reading: BaseDiagnosis | None = None,
+    jobs: int = 1,
 ) -> list[dict[str, Any]]:
     """What a diagnosis with twice the number says; reading: by default it hands on nothing."""
-    path, case = folder / "kept.jsonl", Case("small", number, 2.0)
-    reading = reading or Reading(last={number: 0})
+    path, case = folder / "kept.jsonl", SensitivityCase("small", number, 2.0)
+    reading = reading or BaseDiagnosis(last={number: 0})
     Forks(reading, [case], jobs, Kept(path).keep, math.inf).run(diagnose, folder)
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()[1:]]

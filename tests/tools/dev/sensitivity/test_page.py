@@ -8,24 +8,24 @@ import pytest
 
 from gritd.tools.dev.sensitivity import runs as kept
 from gritd.tools.dev.sensitivity.numbers import Field, changed
-from gritd.tools.dev.sensitivity.outcome import Handed, Outcome
+from gritd.tools.dev.sensitivity.outcome import DiagnosisOutcome, Handed
 from gritd.tools.dev.sensitivity.page import by_hand, page
-from gritd.tools.dev.sensitivity.runs import Runs, run
+from gritd.tools.dev.sensitivity.runs import DiagnosedRuns, run
 from gritd.tools.diagnose.tuning import TUNING
 
 LEVEL, ODDS, KINDS = Field("screen", "level"), Field("search", "odds"), Field("screen", "kinds")
 
 
-def stub(folder: Path, handed: Handed) -> Outcome:
+def stub(folder: Path, handed: Handed) -> DiagnosisOutcome:
     """Its verdict hangs on the level of the screen, tan φ on the odds, nothing on the kinds."""
     explained = TUNING.screen.level > 0.0075
     tan_phi = 0.5 + TUNING.search.odds
     assert TUNING.screen.sure > 0.0
     verdict, names = ("explained", ("loss",)) if explained else ("consistent", ())
-    return Outcome(verdict, names, {"loss": 0.75 if explained else 0.5}, tan_phi, 0.1)
+    return DiagnosisOutcome(verdict, names, {"loss": 0.75 if explained else 0.5}, tan_phi, 0.1)
 
 
-def finished(folder: Path, minutes: float = 60.0, only: tuple[str, ...] = ()) -> Runs:
+def finished(folder: Path, minutes: float = 60.0, only: tuple[str, ...] = ()) -> DiagnosedRuns:
     every = list(run([folder / "a"], folder / "kept.jsonl", only, 2, minutes, stub))
     return every[-1] if every else kept.Kept(folder / "kept.jsonl").runs()
 

@@ -10,7 +10,7 @@ import pytest
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.proof.ours.unlisted import CableDrag
+from gritd.tools.proof.ours.unlisted import CableChainDrag
 from tests.tools.diagnose.campaigns import diagnosed, plan
 
 
@@ -44,5 +44,5 @@ def test_what_is_insufficient_is_made_sufficient() -> None:
 
 @pytest.mark.slow
 def test_a_stranger_is_followed_up_where_it_lives() -> None:
-    found = diagnosed(plan(), (CableDrag(size=8.0),))
+    found = diagnosed(plan(), (CableChainDrag(size=8.0),))
     assert found.verdict == "unlisted" and proposed(found)

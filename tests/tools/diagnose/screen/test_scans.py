@@ -26,7 +26,7 @@ from gritd.tools.diagnose.screen.screen import tail_chance
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.proof.ours.cases import record
-from gritd.tools.proof.ours.unlisted import NextDoor, RailJoint
+from gritd.tools.proof.ours.unlisted import NextDoor, RailJointDrag
 from tests.tools.diagnose.campaigns import plan
 
 RUNS, LENGTH, STEP = 3, 250, 0.1
@@ -109,7 +109,7 @@ def test_a_machine_next_door_is_heard_with_its_period() -> None:
 
 def test_a_joint_of_the_rails_is_found_where_it_is() -> None:
     """And the law holds it, so that held-out runs are predicted and the soil need not bend."""
-    search = begun(RailJoint, 2.0)
+    search = begun(RailJointDrag, 2.0)
     evidence = search.first.evidence
     assert search.first.alarmed
     assert max(evidence, key=lambda of: evidence[of]) == Shape(

@@ -31,7 +31,7 @@ from gritd.tools.diagnose.verdict import decide, resemblance
 from gritd.tools.diagnose.verdict.calibration import learnt
 from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth, main, read
 from gritd.tools.proof.ours.cases import record
-from gritd.tools.proof.ours.other_forms import LorentzStribeck
+from gritd.tools.proof.ours.other_forms import HessSoomFriction
 from tests.tools.diagnose.campaigns import plan, settings
 
 
@@ -62,7 +62,7 @@ def test_another_published_form_keeps_its_name() -> None:
     more, and what it is bent by is paid for by far.
     """
     ours = _model((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
-    other = _model((LorentzStribeck(size=1.5),), "stribeck_friction")
+    other = _model((HessSoomFriction(size=1.5),), "stribeck_friction")
     assert ours.bends == (bending_sizes().values[0],) < other.bends
     assert other.marginal is not None
     assert other.evidence > other.marginal.log_evidence((0,)) + 3.0

@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground
+from gritd.tools.proof.blind.plant.contact import PlantSoil
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.respond import World, responses
-from gritd.tools.proof.blind.plant.scene import Felt, Motion, Rig
+from gritd.tools.proof.blind.plant.scene import Felt, TrueMotion, TrueRig
 from gritd.tools.proof.blind.plant.servo import Servo
 from gritd.tools.proof.blind.plant.strips import StripBed
 
 WEIGHTS = (31.3, 46.8, 78.6, 101.6, 30.9, 52.1)  # [N], runs 0-5
-RIG = Rig(0.072, 0.071, 1.0, Servo(1.0, 1.0, 1.0), Servo(1.0, 1.0, 1.0), 0.01)
-GROUND = Ground(1000.0, float(np.tan(np.radians(30.0))), 0.025, 1.1, 1523400.0 + 900.0 / 0.071)
+RIG = TrueRig(0.072, 0.071, 1.0, Servo(1.0, 1.0, 1.0), Servo(1.0, 1.0, 1.0), 0.01)
+GROUND = PlantSoil(1000.0, float(np.tan(np.radians(30.0))), 0.025, 1.1, 1523400.0 + 900.0 / 0.071)
 EVERY = 5  # of 250 Hz
 SETTLED = 2.0  # [s] after a change
 
@@ -57,9 +57,9 @@ def _read(path: Path) -> dict[str, Array]:
     return {name: np.asarray(table[name], dtype=float) for name in table.dtype.names or ()}
 
 
-def _motion(known: dict[str, Array], weight: float) -> Motion:
+def _motion(known: dict[str, Array], weight: float) -> TrueMotion:
     heavy = np.full(known["t"].size, weight)
-    return Motion(known["t"], known["angle"], known["omega"], known["x"], known["v"], heavy, 1)
+    return TrueMotion(known["t"], known["angle"], known["omega"], known["x"], known["v"], heavy, 1)
 
 
 def _steady(known: dict[str, Array]) -> Iterator[tuple[float, Array]]:

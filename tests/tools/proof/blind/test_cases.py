@@ -21,7 +21,7 @@ from gritd.tools.proof.blind.strata import Assignment
 
 
 @pytest.fixture(scope="module")
-def null() -> cases.Case:
+def null() -> cases.BlindCase:
     """A case with nothing concealed, force sensor on."""
     return cases.drawn(
         1, 7, Assignment("none", without=(("wrench", True), ("runs", 2), ("standstill", True)))
@@ -106,7 +106,7 @@ def test_what_is_as_strong_as_on_a_testbed_is_so_however_well_it_shows() -> None
         assert case.single == (pytest.approx(Detector(case.trial).detectability([effect])),)
 
 
-def test_what_is_off_is_invisible(null: cases.Case) -> None:
+def test_what_is_off_is_invisible(null: cases.BlindCase) -> None:
     detector = Detector(null.trial)
     facts = detector.facts()
     for form in [form for forms in (LISTED | UNLISTED).values() for form in forms]:
@@ -114,7 +114,7 @@ def test_what_is_off_is_invisible(null: cases.Case) -> None:
         assert detector.detectability([off]) < 0.05, form.__name__
 
 
-def test_an_offset_within_its_calibration_is_invisible(null: cases.Case) -> None:
+def test_an_offset_within_its_calibration_is_invisible(null: cases.BlindCase) -> None:
     """What the stated calibration error explains is not evidence."""
     detector, sigma = Detector(null.trial), null.trial.known.instruments["motor_shunt"].offset.sigma
     assert detector.detectability([BentOffset(sigma)]) < 1.0
@@ -144,11 +144,11 @@ def test_standstill_tells_friction_from_offset() -> None:
     assert left[False] < 0.1 < left[True]
 
 
-def handed_over(case: cases.Case, folder: Path) -> list[Path]:
+def handed_over(case: cases.BlindCase, folder: Path) -> list[Path]:
     return handover.write(case, handover.driven(case), folder)
 
 
-def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.Case, tmp_path: Path) -> None:
+def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.BlindCase, tmp_path: Path) -> None:
     files = handed_over(null, tmp_path / "given")
     loaded = config.load(tmp_path / "given" / handover.CONFIGURATION)
     true, told = null.trial.world.ground, loaded.settings.soil
@@ -218,7 +218,7 @@ def test_a_load_that_is_weighed_is_not_stated(tmp_path: Path) -> None:
     assert all(info.nominal_load is None for info in infos)
 
 
-def test_slow_noise_is_as_large_and_correlated(null: cases.Case) -> None:
+def test_slow_noise_is_as_large_and_correlated(null: cases.BlindCase) -> None:
     (before,) = (c for c in null.trial.chain.converters if c.channel == "sinkage_pot")
     (after,) = (
         c for c in knowledge.slowed(null.trial.chain).converters if c.channel == "sinkage_pot"
@@ -231,7 +231,9 @@ def test_slow_noise_is_as_large_and_correlated(null: cases.Case) -> None:
     assert np.corrcoef(means[1:], means[:-1])[0, 1] == pytest.approx(0.95, abs=0.02)
 
 
-def test_the_truth_is_the_recording_without_its_noise(null: cases.Case, tmp_path: Path) -> None:
+def test_the_truth_is_the_recording_without_its_noise(
+    null: cases.BlindCase, tmp_path: Path
+) -> None:
     (alone,) = handover.driven(null)
     recording = read(handover.write(null, [alone], tmp_path / "given")[0])
     said = config.load(tmp_path / "given" / handover.CONFIGURATION).settings.channels["sinkage_pot"]

@@ -8,7 +8,7 @@ import pytest
 
 from gritd.tools.proof.blind import heldout
 from gritd.tools.proof.blind.strata import Assignment
-from gritd.tools.proof.blind.trial import Spec
+from gritd.tools.proof.blind.trial import WorkerSpec
 
 TIME = np.linspace(0.0, 10.0, 51)
 BEGINS = 300.0  # [s] since the campaign began
@@ -18,7 +18,7 @@ BEGINS = 300.0  # [s] since the campaign began
 @pytest.mark.parametrize("bed", ["", "same"])
 def test_errors_are_of_the_samples_that_were_used(tmp_path: Path, later: float, bed: str) -> None:
     """Times of a pair count from the new campaign or from its reference, a day before."""
-    spec = Spec(1, 2, Assignment("pair"), str(tmp_path))
+    spec = WorkerSpec(1, 2, Assignment("pair"), str(tmp_path))
     spec.answers.parent.mkdir(parents=True)
     name = "new-2" if bed else "run-2"
     np.savez(spec.answers.with_name(f"{spec.name}.{name}.npz"), time=TIME, torque=2.0 * TIME)

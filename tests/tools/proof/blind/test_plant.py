@@ -18,7 +18,7 @@ from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
 from gritd.tools.proof.blind.plant.concealed.friction import lugre, maxwell
 from gritd.tools.proof.blind.plant.contact import Rim, reaction
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.respond import drive, respond, responses
 from gritd.tools.proof.blind.plant.servo import Servo, follow
@@ -100,7 +100,7 @@ def test_without_effects_it_is_the_papers_wheel() -> None:
 
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.__name__)
-def test_an_effect_is_off_at_zero_and_felt_at_its_largest(form: type[Effect]) -> None:
+def test_an_effect_is_off_at_zero_and_felt_at_its_largest(form: type[PlantEffect]) -> None:
     effect = form.drawn(np.random.default_rng(5), FACTS)
     plain = drive(WORLD, run())
     off = respond(WORLD.with_effects(replace(effect, strength=0.0)), plain.scene.motion)

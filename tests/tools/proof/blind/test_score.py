@@ -11,9 +11,9 @@ import pytest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.proof.blind import calibration, page, score, score_worlds, seal, shares, tables
 from gritd.tools.proof.blind.plant.worlds import HELD
-from gritd.tools.proof.blind.verdicts import Hypothesis, Row
+from gritd.tools.proof.blind.verdicts import CaseRow, StatedHypothesis
 
-NOBODY = Row(
+NOBODY = CaseRow(
     number=1,
     stratum="none",
     level="",
@@ -36,13 +36,15 @@ NOBODY = Row(
 )
 
 
-def said(name: str, probability: float = 0.8, *others: str, accepted: bool = True) -> Hypothesis:
-    return Hypothesis(name, probability, frozenset((name, *others)), accepted, {})
+def said(
+    name: str, probability: float = 0.8, *others: str, accepted: bool = True
+) -> StatedHypothesis:
+    return StatedHypothesis(name, probability, frozenset((name, *others)), accepted, {})
 
 
 def single(
-    name: str, *hypotheses: Hypothesis, verdict: str = "explained", strong: float = 60.0
-) -> Row:
+    name: str, *hypotheses: StatedHypothesis, verdict: str = "explained", strong: float = 60.0
+) -> CaseRow:
     return replace(
         NOBODY,
         stratum="single",
@@ -54,7 +56,7 @@ def single(
     )
 
 
-def pair(row: Row, world: str = "strips", bed: str = "prepared") -> Row:
+def pair(row: CaseRow, world: str = "strips", bed: str = "prepared") -> CaseRow:
     return replace(row, stratum="pair", world=world, bed=bed)
 
 
@@ -163,7 +165,7 @@ def test_a_companion_is_false_where_it_is_neither_there_nor_like_what_is() -> No
 
 
 def test_both_of_two_are_named_by_name_or_by_group() -> None:
-    def two(*hypotheses: Hypothesis) -> Row:
+    def two(*hypotheses: StatedHypothesis) -> CaseRow:
         one = single("bed_slope", *hypotheses)
         return replace(one, stratum="two", truth=("bed_slope", "grousers"))
 
@@ -248,7 +250,7 @@ def test_a_foreign_worlds_own_names_are_true_of_it_but_not_new_in_it() -> None:
 
 
 def test_soil_that_is_said_to_be_unknown_counts_apart() -> None:
-    def stated(z: float) -> Row:
+    def stated(z: float) -> CaseRow:
         one = {"before": 0.1, "after": 0.1, "z_before": 0.5, "z_after": z}
         return replace(NOBODY, soil={"c": one, "tan_phi": one})
 

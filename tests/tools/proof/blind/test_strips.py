@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.tools.proof.blind.knowledge import FAMILIES
-from gritd.tools.proof.blind.plant.contact import Ground
+from gritd.tools.proof.blind.plant.contact import PlantSoil
 from gritd.tools.proof.blind.plant.respond import World, respond, responses
-from gritd.tools.proof.blind.plant.scene import Felt, Motion
+from gritd.tools.proof.blind.plant.scene import Felt, TrueMotion
 from gritd.tools.proof.blind.plant.strips import StripBed
 from tests.tools.proof.blind.scene import GROUND, RIG
 
@@ -18,12 +18,12 @@ SPEED = 0.02  # of the rim [m/s]
 WORLD = World(RIG, GROUND, bed=StripBed())
 
 
-def steady(weight: float, slip: float, seconds: float = 12.0, way: float = 1.0) -> Motion:
+def steady(weight: float, slip: float, seconds: float = 12.0, way: float = 1.0) -> TrueMotion:
     """One load and slip, forward or (way = −1) backward, on fresh soil."""
     time = np.arange(0.0, seconds, 0.05)
     ones = np.ones(time.size)
     speed = way * SPEED * (1.0 - slip)
-    return Motion(
+    return TrueMotion(
         time,
         way * SPEED / RIG.radius * time,
         way * SPEED / RIG.radius * ones,
@@ -52,7 +52,7 @@ def test_everything_is_finite_and_costs_power(
 ) -> None:
     """What the soil takes from the motor is more than what it gives the carriage."""
     cohesion, phi, *others = FAMILIES[family]
-    ground = Ground(cohesion, float(np.tan(np.radians(phi))), *others)
+    ground = PlantSoil(cohesion, float(np.tan(np.radians(phi))), *others)
     weight = share * RIG.radius * RIG.width * 2.0e4
     felt = respond(replace(WORLD, ground=ground), steady(weight, slip, way=way))
     for name in ("sinkage", "torque", "pull", "load", "current"):

@@ -8,7 +8,7 @@ import pytest
 
 from gritd.tools.proof.blind.plant import worlds
 from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.habits import LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.respond import World, drive, respond, responses
 from gritd.tools.proof.blind.plant.scene import Felt
@@ -67,7 +67,7 @@ def test_more_slip_asks_for_more_torque_and_pulls_harder(name: str) -> None:
 @pytest.mark.parametrize(
     "habit", [Relaxation(0.0), WornGear(0.0, 0.0, 0.0), LeakingSensor(0.0)], ids=lambda h: str(h)
 )
-def test_a_habit_is_off_at_zero(habit: Effect) -> None:
+def test_a_habit_is_off_at_zero(habit: PlantEffect) -> None:
     plain = drive(World(RIG, GROUND), run())
     off = respond(World(RIG, GROUND, habits=(habit,)), plain.scene.motion)
     for channel in READ:
@@ -84,7 +84,9 @@ def undisturbed(name: str) -> Felt:
 
 @pytest.mark.parametrize("name", ["several", "strips"])
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.__name__)
-def test_effects_act_in_foreign_worlds_and_are_off_at_zero(name: str, form: type[Effect]) -> None:
+def test_effects_act_in_foreign_worlds_and_are_off_at_zero(
+    name: str, form: type[PlantEffect]
+) -> None:
     if not worlds.concealable(name, (form.name,)):
         pytest.skip(f"{form.name} is what the world {name} has of its own")
     effect, own = form.drawn(np.random.default_rng(5), FACTS), world(name)

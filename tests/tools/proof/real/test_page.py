@@ -12,7 +12,7 @@ from gritd.tools.proof.real.bench import DiagnosisRun
 from gritd.tools.proof.real.cmu import moduli
 from gritd.tools.proof.real.figure import draw
 from gritd.tools.proof.real.page import page, section
-from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table
+from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof
 
 LABELS = ("concealed", "as read", "freed")
 
@@ -38,7 +38,7 @@ def finding() -> Finding:
         Check("How large?", "1.8", "none", False, "A reason over two lines."),
         Check("Is it said?", "yes", "yes", True, "not shown"),
     ]
-    return Finding([diagnosis()], checks, Table(("a", "b"), [("1|2", "3")]), [])
+    return Finding([diagnosis()], checks, FigureTable(("a", "b"), [("1|2", "3")]), [])
 
 
 def proof() -> Proof:

@@ -14,7 +14,7 @@ from gritd.tools.commands.import_rig import main
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.signals import drive_series
 from gritd.tools.proof.real import chrono, cmu, ding, emps, mgst
-from gritd.tools.proof.real.bench import Bench
+from gritd.tools.proof.real.bench import CommandBench
 from gritd.tools.proof.real.proof import Check, Finding, Proof
 from tests.real_recordings import REAL, needs
 from tests.tools.diagnose.rig.drives import fitted
@@ -22,7 +22,7 @@ from tests.tools.diagnose.rig.drives import fitted
 
 def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Check]]:
     """What a proof found, and the judge's questions by how they begin."""
-    finding = proof.run(Bench(REAL, folder))
+    finding = proof.run(CommandBench(REAL, folder))
     assert finding.diagnoses and all(s.text.startswith("verdict: ") for s in finding.diagnoses)
     assert finding.table.rows and finding.panels
     return finding, {a.question.split(",")[0].split("?")[0]: a for a in finding.checks}

@@ -17,7 +17,7 @@ LIFTED = 1.0  # [N] below this weight the wheel hangs
 COARSE = 0.02  # [s] grid of the vertical balance and of the first sweeps
 
 
-class Bed(Protocol):
+class BedForm(Protocol):
     """A kind of bed. What a scene says of soil and rim holds on it, as far as it knows the word."""
 
     def carry(self, scenes: Sequence[Scene], weights: Sequence[Array], damped: bool) -> list[Scene]:
@@ -32,7 +32,7 @@ class EquationBed:
     """Eqs. (1)-(10) at every sample; the axle follows its balance with a lag."""
 
     def carry(self, scenes: Sequence[Scene], weights: Sequence[Array], damped: bool) -> list[Scene]:
-        """See `Bed.carry`; weights (n,) [N] of each scene."""
+        """See `BedForm.carry`; weights (n,) [N] of each scene."""
         return [
             _carried(scene, weight, damped) for scene, weight in zip(scenes, weights, strict=True)
         ]

@@ -19,7 +19,7 @@ LIGHT = 5e3  # σ₀ [Pa] pressure below which a smooth rim grips like a rough o
 
 
 @dataclass(frozen=True)
-class Ground:
+class PlantSoil:
     """Soil under the wheel, sample by sample: floats or arrays (n,)."""
 
     cohesion: Array | float  # c [Pa]
@@ -43,7 +43,7 @@ class Rim:
     skew: Array | float = 0.0  # tangent of the angle from the wheel's plane to its travel
 
 
-Sampled = TypeVar("Sampled", Ground, Rim)
+Sampled = TypeVar("Sampled", PlantSoil, Rim)
 
 
 def thinned(what: Sampled, every: int) -> Sampled:
@@ -62,7 +62,7 @@ def columned(what: Sampled) -> Sampled:
     return replace(what, **held)
 
 
-class Reaction(NamedTuple):
+class SoilReaction(NamedTuple):
     """What the soil does to the wheel, arrays (n,)."""
 
     pull: Array  # DP [N], Eq. (8)
@@ -91,8 +91,8 @@ class Zone(NamedTuple):
 
 
 def reaction(
-    ground: Ground, rim: Rim, radius: float, width: float, ratio: Array, theta_1: Array
-) -> Reaction:
+    ground: PlantSoil, rim: Rim, radius: float, width: float, ratio: Array, theta_1: Array
+) -> SoilReaction:
     """Forces at entry angle θ₁ (n,) and v/(rω) `ratio` (n,)."""
     theta_1 = np.maximum(theta_1, 1e-6)
     zones = _zones(rim, theta_1)
@@ -102,7 +102,7 @@ def reaction(
 
     arc = theta_1 + exit_angle(rim, theta_1)
     area = radius * width
-    return Reaction(
+    return SoilReaction(
         area * along, area * down, radius * area * turning, pressing / arc, area * across
     )
 
@@ -146,7 +146,7 @@ def _nodes(entry: Array, turned: Array, shadow: Array | None, width: Array) -> Z
 
 
 def _zone(
-    ground: Ground, rim: Rim, radius: float, ratio: Array, zone: Zone
+    ground: PlantSoil, rim: Rim, radius: float, ratio: Array, zone: Zone
 ) -> tuple[Array, Array, Array, Array, Array]:
     """∫(τ cos − σ sin), ∫(σ cos + τ sin), ∫τ, ∫σ, ∫τ across, over one zone."""
     sigma = _normal(ground, radius, zone.drop)
@@ -168,7 +168,7 @@ def _zone(
     )
 
 
-def _normal(ground: Ground, radius: float, drop: Array) -> Array:
+def _normal(ground: PlantSoil, radius: float, drop: Array) -> Array:
     """σ = K rⁿ (cos θ − cos θ₁)ⁿ, Eqs. (3), (4)."""
     depth = radius * np.maximum(drop, 1e-30)
     stress: Array = ground.modulus * np.exp(ground.exponent * np.log(depth))
@@ -176,7 +176,7 @@ def _normal(ground: Ground, radius: float, drop: Array) -> Array:
 
 
 def sheared(
-    ground: Ground, rim: Rim, sigma: Array, jay: Array, sliding: Sliding | None = None
+    ground: PlantSoil, rim: Rim, sigma: Array, jay: Array, sliding: Sliding | None = None
 ) -> tuple[Array, Array]:
     """Shear stress τ along and across the wheel's plane under normal stress σ and displacement j,
     Eqs. (2), (7). All broadcast to (n, nodes).

@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground, Rim
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.scene import Felt, Motion, Scene
+from gritd.tools.proof.blind.plant.scene import Felt, Scene, TrueMotion
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Effect:
+class PlantEffect:
     """One physical effect of one strength; subclasses add shapes as fields, with their draw.
 
     `most` is the largest strength still plausible on a testbed; `signed` says that it may have
@@ -46,7 +46,7 @@ class Effect:
     def meets_soil(cls) -> bool:
         """Whether it changes how the soil carries the wheel."""
         before = ("radius", "soil", "contact", "carried")
-        return any(getattr(cls, step) is not getattr(Effect, step) for step in before)
+        return any(getattr(cls, step) is not getattr(PlantEffect, step) for step in before)
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
@@ -57,11 +57,11 @@ class Effect:
     def sign(cls, rng: np.random.Generator) -> float:
         return float(rng.choice((-1.0, 1.0))) if cls.signed else 1.0
 
-    def radius(self, radius: Array, motion: Motion) -> Array:
+    def radius(self, radius: Array, motion: TrueMotion) -> Array:
         """Radius below the axle (n,) [m], of that of the effects before (n,) [m]."""
         return radius
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         return ground
 
     def contact(self, rim: Rim, scene: Scene) -> Rim:

@@ -9,7 +9,7 @@ import numpy as np
 from gritd.tools.proof.blind.plant.concealed.friction import lugre
 from gritd.tools.proof.blind.plant.concealed.travel import relaxed, steps_of
 from gritd.tools.proof.blind.plant.contact import Rim
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.memory import lagged
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Scene
@@ -19,7 +19,7 @@ SHALLOW, DEEP = 0.05, 0.5 * np.pi  # θ₁ [rad] within which it goes with the c
 
 
 @dataclass(frozen=True)
-class BottomPeak(Effect):
+class BottomPeak(PlantEffect):
     """Stress peaks near the bottom, θₘ/θ₁ = strength + slope √i, and the soil springs back."""
 
     slope: float = 0.1
@@ -31,7 +31,7 @@ class BottomPeak(Effect):
 
 
 @dataclass(frozen=True)
-class Relaxation(Effect):
+class Relaxation(PlantEffect):
     """Torque and pull follow over the length of the contact, `strength` [m] at an entry angle of
     30° and more where the wheel is deeper; the sinkage over as much and more.
     """
@@ -46,7 +46,7 @@ class Relaxation(Effect):
 
 
 @dataclass(frozen=True)
-class WornGear(Effect):
+class WornGear(PlantEffect):
     """The gear takes a share of the torque (`strength`) and a level, and its teeth are felt."""
 
     level: float = 0.1  # [N·m]
@@ -63,7 +63,7 @@ class WornGear(Effect):
 
 
 @dataclass(frozen=True)
-class LeakingSensor(Effect):
+class LeakingSensor(PlantEffect):
     """Load and torque leak into the pull, the pull into load and torque; `strength`: the load's."""
 
     torque: float = 0.0  # of the torque into the pull [1/m]

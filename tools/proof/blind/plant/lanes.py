@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gritd.tools.proof.blind.plant.contact import Ground, Rim, Sampled
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim, Sampled
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
@@ -21,7 +21,7 @@ class Moment(NamedTuple):
     moved: Array  # way of the carriage since the step before [m]
     place: Array  # of the carriage [m]
     weight: Array  # [N]
-    ground: Ground
+    ground: PlantSoil
     rim: Rim
 
 
@@ -32,7 +32,7 @@ class Lanes(NamedTuple):
     moved: Array
     place: Array
     weight: Array
-    ground: Ground
+    ground: PlantSoil
     rim: Rim
     radius: Array  # (lanes, 1) mean radius of the wheel [m]
     passes: NDArray[np.int64]  # (lanes,) 1 on fresh soil
@@ -60,14 +60,16 @@ def lanes(scenes: Sequence[Scene], weights: Sequence[Array], step: float) -> Lan
 
     place = stacked([scene.motion.travel for scene in scenes])
     rolled = stacked([np.cumsum(scene.rim_speed) * scene.motion.step for scene in scenes])
-    ground = {f.name: stacked([getattr(s.ground, f.name) for s in scenes]) for f in fields(Ground)}
+    ground = {
+        f.name: stacked([getattr(s.ground, f.name) for s in scenes]) for f in fields(PlantSoil)
+    }
     rim = {f.name: stacked([getattr(s.rim, f.name) for s in scenes]) for f in fields(Rim)}
     return Lanes(
         np.diff(rolled, axis=0, prepend=rolled[:1]),
         np.diff(place, axis=0, prepend=place[:1]),
         place,
         stacked(weights),
-        Ground(**ground),
+        PlantSoil(**ground),
         Rim(**rim),
         np.array([[float(scene.radius.mean())] for scene in scenes]),
         np.array([scene.motion.passes for scene in scenes]),

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.bed import COARSE, Bed, EquationBed, every_of
-from gritd.tools.proof.blind.plant.contact import Ground
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.bed import COARSE, BedForm, EquationBed, every_of
+from gritd.tools.proof.blind.plant.contact import PlantSoil
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.scene import Felt, Motion, Rig, Scene, scene_of
+from gritd.tools.proof.blind.plant.scene import Felt, Scene, TrueMotion, TrueRig, scene_of
 from gritd.tools.proof.blind.plant.servo import follow, summed
 
 ROUNDS = 2  # of path-dependent effects, which need the sinkage that depends on them
@@ -23,23 +23,23 @@ SWEEPS = 2  # of motion against soil; docs/trials.md states what a third changes
 class World:
     """The rig, the soil, and what acts beyond Eqs. (1)-(10)."""
 
-    rig: Rig
-    ground: Ground
-    effects: tuple[Effect, ...] = ()  # concealed
-    bed: Bed = field(default_factory=EquationBed)
-    habits: tuple[Effect, ...] = ()  # of the world itself: there in every campaign of it
+    rig: TrueRig
+    ground: PlantSoil
+    effects: tuple[PlantEffect, ...] = ()  # concealed
+    bed: BedForm = field(default_factory=EquationBed)
+    habits: tuple[PlantEffect, ...] = ()  # of the world itself: there in every campaign of it
 
     @property
-    def acting(self) -> tuple[Effect, ...]:
+    def acting(self) -> tuple[PlantEffect, ...]:
         return (*self.habits, *self.effects)
 
-    def with_effects(self, *effects: Effect) -> World:
+    def with_effects(self, *effects: PlantEffect) -> World:
         """The same rig, bed and soil with these effects concealed."""
         return replace(self, effects=effects)
 
 
 @dataclass(frozen=True)
-class Orders:
+class Commanded:
     """What the controllers are told, arrays (n,) at a fixed step."""
 
     time: Array  # [s] since the campaign began
@@ -50,13 +50,13 @@ class Orders:
     start: float  # [m] on the bed
 
 
-def respond(world: World, motion: Motion, damped: bool = True) -> Felt:
+def respond(world: World, motion: TrueMotion, damped: bool = True) -> Felt:
     """What is felt and read when the rig moves like this."""
     return responses([(world, motion)], damped)[0]
 
 
 def responses(
-    asked: Sequence[tuple[World, Motion]],
+    asked: Sequence[tuple[World, TrueMotion]],
     damped: bool = True,
     near: Sequence[Scene | None] | None = None,
 ) -> list[Felt]:
@@ -81,12 +81,12 @@ def responses(
     return [_sensed(world, scene) for (world, _), scene in zip(asked, done, strict=True)]
 
 
-def drive(world: World, orders: Orders) -> Felt:
+def drive(world: World, orders: Commanded) -> Felt:
     """The controllers drive the rig; motion and soil are solved in turns."""
     return drives(world, [orders])[0]
 
 
-def drives(world: World, orders: Sequence[Orders]) -> list[Felt]:
+def drives(world: World, orders: Sequence[Commanded]) -> list[Felt]:
     """Several runs of one world, first on a coarse grid."""
     coarse = [_thinned(one, every_of(one.time, COARSE)) for one in orders]
     against = [(np.zeros(one.time.size), np.zeros(one.time.size)) for one in coarse]
@@ -103,12 +103,12 @@ def drives(world: World, orders: Sequence[Orders]) -> list[Felt]:
     return responses([(world, motion) for motion in motions])
 
 
-def _thinned(orders: Orders, every: int) -> Orders:
+def _thinned(orders: Commanded, every: int) -> Commanded:
     kept = {name: getattr(orders, name)[::every] for name in ("time", "omega", "speed", "weight")}
     return replace(orders, **kept)
 
 
-def _motion(rig: Rig, orders: Orders, against: tuple[Array, Array]) -> Motion:
+def _motion(rig: TrueRig, orders: Commanded, against: tuple[Array, Array]) -> TrueMotion:
     """How the rig moves while a torque [N·m] and a pull [N] hold it back."""
     torque, pull = against
     step = float(orders.time[1] - orders.time[0])
@@ -116,12 +116,12 @@ def _motion(rig: Rig, orders: Orders, against: tuple[Array, Array]) -> Motion:
     omega = follow(rig.wheel, orders.omega, torque, step, substeps)
     speed = follow(rig.carriage, orders.speed, -pull, step, substeps)
     travel = orders.start + summed(speed, step)
-    return Motion(
+    return TrueMotion(
         orders.time, summed(omega, step), omega, travel, speed, orders.weight, orders.passes
     )
 
 
-def _met(world: World, motion: Motion, near: Scene | None) -> Scene:
+def _met(world: World, motion: TrueMotion, near: Scene | None) -> Scene:
     """The scene before the soil answers, or the one that is known where it must be the same."""
     if near is None:
         return _scene(world, motion)
@@ -131,7 +131,7 @@ def _met(world: World, motion: Motion, near: Scene | None) -> Scene:
     return replace(_scene(world, motion), theta_1=near.theta_1)
 
 
-def _scene(world: World, motion: Motion) -> Scene:
+def _scene(world: World, motion: TrueMotion) -> Scene:
     radius = np.full(motion.time.size, world.rig.radius)
     for effect in world.acting:
         radius = effect.radius(radius, motion)
@@ -154,8 +154,8 @@ def _carry(worlds: Sequence[World], scenes: list[Scene], damped: bool) -> list[S
     return scenes
 
 
-def _path_dependent(effect: Effect) -> bool:
-    return type(effect).carried is not Effect.carried
+def _path_dependent(effect: PlantEffect) -> bool:
+    return type(effect).carried is not PlantEffect.carried
 
 
 def _weight(world: World, scene: Scene) -> Array:
@@ -165,7 +165,7 @@ def _weight(world: World, scene: Scene) -> Array:
     return weight
 
 
-def _forced(effects: Sequence[Effect], scene: Scene) -> Scene:
+def _forced(effects: Sequence[PlantEffect], scene: Scene) -> Scene:
     for effect in effects:
         scene = effect.forces(scene)
     return scene
@@ -199,4 +199,4 @@ def _sensed(world: World, scene: Scene) -> Felt:
     return felt
 
 
-__all__ = ["Orders", "World", "drive", "drives", "respond", "responses"]
+__all__ = ["Commanded", "World", "drive", "drives", "respond", "responses"]

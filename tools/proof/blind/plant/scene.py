@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground, Rim
+from gritd.tools.proof.blind.plant.contact import PlantSoil, Rim
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.servo import Servo
 
@@ -20,7 +20,7 @@ HANGING = -5e-3  # [m] sinkage of a lifted wheel
 
 
 @dataclass(frozen=True)
-class Rig:
+class TrueRig:
     """The rig as it is, not as configured."""
 
     radius: float  # r [m]
@@ -32,7 +32,7 @@ class Rig:
 
 
 @dataclass(frozen=True)
-class Motion:
+class TrueMotion:
     """True motion of one run, arrays (n,) at a fixed step."""
 
     time: Array  # [s] since the campaign began
@@ -57,13 +57,13 @@ class Motion:
 class Scene:
     """One run as the effects see it; fields after `motion` fill up along the chain. Arrays (n,)."""
 
-    rig: Rig
-    motion: Motion
+    rig: TrueRig
+    motion: TrueMotion
     radius: Array  # below the axle, sample by sample [m]
     direction: Array  # ±1
     moving: Array  # 0 at rest, 1 in motion
     ratio: Array  # v/(rω)
-    ground: Ground
+    ground: PlantSoil
     rim: Rim = field(default_factory=Rim)
     theta_1: Array = field(default_factory=lambda: np.zeros(0))
     sinkage: Array = field(default_factory=lambda: np.zeros(0))
@@ -86,7 +86,9 @@ class Scene:
         return np.asarray(self.radius * self.motion.omega)
 
 
-def scene_of(rig: Rig, ground: Ground, motion: Motion, radius: Array | None = None) -> Scene:
+def scene_of(
+    rig: TrueRig, ground: PlantSoil, motion: TrueMotion, radius: Array | None = None
+) -> Scene:
     """Kinematics of one run; radius (n,) below the axle [m], if it varies."""
     radius = np.full(motion.time.size, rig.radius) if radius is None else radius
     rim = radius * motion.omega

@@ -19,7 +19,7 @@ TRANSPORT = (2e-4, 2e-3)  # [s] from sampling to receipt
 
 
 @dataclass(frozen=True)
-class Noise:
+class SensorNoise:
     """Of one reading, in raw units: white, and a coloured part of its own correlation time."""
 
     white: float
@@ -56,7 +56,7 @@ class Converter:
     channel: str
     scale: float
     offset: float
-    noise: Noise
+    noise: SensorNoise
     quantum: float  # raw unit of the last bit
     low: float
     high: float
@@ -71,7 +71,7 @@ class Converter:
 
 
 @dataclass(frozen=True)
-class Chain:
+class SensorChain:
     """All channels of a rig, its clock's jitter and its losses."""
 
     converters: tuple[Converter, ...]  # of the simple channels
@@ -81,7 +81,7 @@ class Chain:
 
 
 def readings(
-    chain: Chain, felt: Felt, pulley: float, begins: int, rng: np.random.Generator
+    chain: SensorChain, felt: Felt, pulley: float, begins: int, rng: np.random.Generator
 ) -> list[Reading]:
     """What the devices send in one run, by time of receipt; `begins` is the run's start [ns since
     the epoch].
@@ -104,7 +104,7 @@ def readings(
     return sorted(sent, key=lambda reading: (reading.received, reading.channel))
 
 
-def _instants(chain: Chain, rate: float, time: Array, rng: np.random.Generator) -> Array:
+def _instants(chain: SensorChain, rate: float, time: Array, rng: np.random.Generator) -> Array:
     """Sampling instants [s] of a channel: a rate, a random phase, jitter, and gaps."""
     instants = rng.uniform(0.0, 1.0 / rate) + np.arange(int(time[-1] * rate)) / rate
     instants = instants + chain.jitter * rng.standard_normal(instants.size)
@@ -120,7 +120,7 @@ def _stamped(
 
 
 def _channel(
-    chain: Chain,
+    chain: SensorChain,
     converter: Converter,
     time: Array,
     signal: Array,
@@ -139,7 +139,7 @@ def _channel(
 
 
 def _wrench(
-    chain: Chain,
+    chain: SensorChain,
     axes: tuple[Converter, Converter, Converter],
     time: Array,
     felt: Felt,

@@ -48,7 +48,7 @@ class StripBed:
         ]
 
 
-class Felt(NamedTuple):
+class StripReaction(NamedTuple):
     """What the bed does at one step (lanes, 1), or at all of them (steps, lanes)."""
 
     sinkage: Array  # [m]
@@ -58,7 +58,7 @@ class Felt(NamedTuple):
     pressure: Array  # mean over the contact [Pa]
 
 
-def _answered(scene: Scene, weight: Array, felt: Felt, lane: int, steps: Array) -> Scene:
+def _answered(scene: Scene, weight: Array, felt: StripReaction, lane: int, steps: Array) -> Scene:
     """The scene with what its lane felt, at its own samples."""
     sinkage, torque, pull, side, pressure = (
         np.interp(scene.motion.time, steps, values[: steps.size, lane]) for values in felt
@@ -111,19 +111,19 @@ class _Strips:
         self._along = np.zeros_like(self._depth)
         self._sinkage = np.zeros((len(scenes), 1))
 
-    def felt(self) -> Felt:
+    def felt(self) -> StripReaction:
         """All steps, (steps, lanes). Where soil is driven again, the passes before were alike."""
         moments, passes = self._rolling.moments(), self._rolling.passes
-        forces: list[Felt] = []
+        forces: list[StripReaction] = []
         for left in range(int(passes.max()) - 1, -1, -1):
             self._depth *= np.repeat(passes > left + 1, self._count)
             self._along[:], self._sinkage[:] = 0.0, 0.0
             forces = [
                 self._step(moment, FIRST if not n else NEWTON) for n, moment in enumerate(moments)
             ]
-        return Felt(*(np.stack(parts)[:, :, 0] for parts in zip(*forces, strict=True)))
+        return StripReaction(*(np.stack(parts)[:, :, 0] for parts in zip(*forces, strict=True)))
 
-    def _step(self, now: Moment, most: int) -> Felt:
+    def _step(self, now: Moment, most: int) -> StripReaction:
         under = self._under(now)
         self._balance(now, under, most)
 
@@ -137,7 +137,7 @@ class _Strips:
         self._depth[under.flat] = np.where(yielding, dent, under.depth)
         self._along[under.flat] = under.along * touched
         total = (under.area * touched).sum(axis=1, keepdims=True)
-        return Felt(
+        return StripReaction(
             self._sinkage.copy(),
             self._radius * force.sum(axis=1, keepdims=True),
             (force * under.cosine - pressed * under.sine).sum(axis=1, keepdims=True),

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.bed import Bed, EquationBed
-from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.bed import BedForm, EquationBed
+from gritd.tools.proof.blind.plant.effect import PlantEffect
 from gritd.tools.proof.blind.plant.habits import BottomPeak, LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.strips import StripBed
 
@@ -57,14 +57,16 @@ def concealable(world: str, names: tuple[str, ...]) -> list[str]:
     return [name for name in names if name not in barred]
 
 
-def drawn(world: str, rng: np.random.Generator, size: Size) -> tuple[Bed, tuple[Effect, ...]]:
+def drawn(
+    world: str, rng: np.random.Generator, size: Size
+) -> tuple[BedForm, tuple[PlantEffect, ...]]:
     """The bed and the habits of a world; sizes by chance."""
     if world == "strips":
         return StripBed(recovery=float(rng.uniform(0.02, 0.1))), ()
     return EquationBed(), _habits(world, rng, size)
 
 
-def _habits(world: str, rng: np.random.Generator, size: Size) -> tuple[Effect, ...]:
+def _habits(world: str, rng: np.random.Generator, size: Size) -> tuple[PlantEffect, ...]:
     if world == "bottom":
         return (_bottom(rng),)
     if world == "relaxation":
@@ -76,15 +78,15 @@ def _habits(world: str, rng: np.random.Generator, size: Size) -> tuple[Effect, .
     return ()
 
 
-def _bottom(rng: np.random.Generator) -> Effect:
+def _bottom(rng: np.random.Generator) -> PlantEffect:
     return BottomPeak(*(float(rng.uniform(*of)) for of in ((0.08, 0.2), (0.0, 0.2), (0.04, 0.2))))
 
 
-def _relaxation(rng: np.random.Generator, share: float) -> Effect:
+def _relaxation(rng: np.random.Generator, share: float) -> PlantEffect:
     return Relaxation(share * float(rng.uniform(0.02, 0.05)), float(rng.uniform(1.0, 2.0)))
 
 
-def _gear(rng: np.random.Generator, size: Size, share: float) -> tuple[Effect, ...]:
+def _gear(rng: np.random.Generator, size: Size, share: float) -> tuple[PlantEffect, ...]:
     scale = share * size.torque
     gear = WornGear(
         share * float(rng.uniform(0.05, 0.2)),

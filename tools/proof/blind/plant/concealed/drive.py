@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
@@ -17,7 +17,7 @@ STANDING = 1e-4  # [rad/s] below which the direction is not taken to have change
 
 
 @dataclass(frozen=True)
-class GearTeeth(Effect, ABC):
+class GearTeeth(PlantEffect, ABC):
     """A ripple at the order of a tooth mesh; its forms give the wave."""
 
     order: int = 24
@@ -65,7 +65,7 @@ class CatchingTeeth(GearTeeth):
 
 
 @dataclass(frozen=True)
-class Play(Effect, ABC):
+class Play(PlantEffect, ABC):
     """The gear has play b at the axle: after a reversal the motor turns b before it drives; its
     forms say how it takes up the load.
     """
@@ -132,7 +132,7 @@ class SoftPlay(Play):
 
 
 @dataclass(frozen=True)
-class HousedWinding(Effect):
+class HousedWinding(PlantEffect):
     """Winding and housing, each with its temperature; the magnets follow the housing, the flux
     falls with them.
 
@@ -169,7 +169,7 @@ class HousedWinding(Effect):
 
 
 @dataclass(frozen=True)
-class LadderedHeat(Effect):
+class LadderedHeat(PlantEffect):
     """Heat creeps into a thick body: K_t falls by β Σ uⱼ/3, τⱼ u̇ⱼ = I² − uⱼ, τⱼ a fourth, one and
     four of τ.
 
@@ -201,7 +201,7 @@ class LadderedHeat(Effect):
 
 
 @dataclass(frozen=True)
-class LossyGear(Effect):
+class LossyGear(PlantEffect):
     """The torque per ampere is K_t (1 + e T²/(T² + T₁²)): a gear that loses a share under load,
     less of it idling. T₁ is a fifth of the usual torque.
 
@@ -224,7 +224,7 @@ class LossyGear(Effect):
 
 
 @dataclass(frozen=True)
-class WarmMagnets(Effect):
+class WarmMagnets(PlantEffect):
     """The torque per ampere is K_t (1 + e) at the usual current, and a twentieth of e less per
     usual current more: calibrated on another day.
 
@@ -250,7 +250,7 @@ class WarmMagnets(Effect):
         return {"error": self.strength}
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     RoundTeeth,
     CatchingTeeth,
     StrikingPlay,

@@ -8,13 +8,13 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Scene
 
 
 @dataclass(frozen=True)
-class SaggingSlope(Effect):
+class SaggingSlope(PlantEffect):
     """The testbed is tilted by α, uphill positive, and bends: W cos α on the soil, W tan(α + s x/L)
     from the pull, s a tenth of α. Statics.
     """
@@ -40,7 +40,7 @@ class SaggingSlope(Effect):
 
 
 @dataclass(frozen=True)
-class LeaningAxis(Effect):
+class LeaningAxis(PlantEffect):
     """The bed is level and the vertical axis leans by α: soil takes W/cos α, and the pull's sensor,
     which leans with it, reads DP cos α − W sin α.
 
@@ -62,7 +62,7 @@ class LeaningAxis(Effect):
 
 
 @dataclass(frozen=True)
-class InclinedBed(Effect, ABC):
+class InclinedBed(PlantEffect, ABC):
     """The bed rises against the rail, by α at first; its forms give how it goes on. The
     potentiometer reads z − rise, and W sin of the grade goes from the pull. Geometry and statics.
     """
@@ -121,7 +121,7 @@ class RollingBed(InclinedBed):
 
 
 @dataclass(frozen=True)
-class JointedFrame(Effect):
+class JointedFrame(PlantEffect):
     """z_read = z + C W/(1 + W/W_h): joints close, so the frame stiffens under load. Source: contact
     stiffening.
     """
@@ -142,7 +142,7 @@ class JointedFrame(Effect):
 
 
 @dataclass(frozen=True)
-class RollingContacts(Effect):
+class RollingContacts(PlantEffect):
     """z_read = z + C W₀ (W/W₀)^(2/3): the rollers of the guide dent their rails. Source: Hertz."""
 
     weight: float = 60.0  # W₀ [N]
@@ -159,7 +159,7 @@ class RollingContacts(Effect):
 
 
 @dataclass(frozen=True)
-class StickingAxis(Effect, ABC):
+class StickingAxis(PlantEffect, ABC):
     """The axis holds back by F h, −1 ≤ h ≤ 1 along the path of z; its forms say how h follows. The
     wheel was lowered: h starts at 1.
     """
@@ -234,7 +234,7 @@ class HystereticAxis(StickingAxis):
 
 
 @dataclass(frozen=True)
-class LeaningWall(Effect):
+class LeaningWall(PlantEffect):
     """DP − s W against travel, growing with slip by half: the skewed wheel pushes to the side as it
     shears.
 
@@ -251,7 +251,7 @@ class LeaningWall(Effect):
 
 
 @dataclass(frozen=True)
-class RoughWall(Effect):
+class RoughWall(PlantEffect):
     """DP − s W (1 + e cos 2πx/l) against travel: a wall that is not quite straight, e = 0.3.
 
     Source: the same rubbing, its normal force from the stiffness of the guide; chosen here.
@@ -274,7 +274,7 @@ class RoughWall(Effect):
         return {"share": self.strength}
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     SaggingSlope,
     LeaningAxis,
     HollowBed,

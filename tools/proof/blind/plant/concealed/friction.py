@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
@@ -47,7 +47,7 @@ def maxwell(omega: Array, level: Array, step: float) -> Array:
 
 
 @dataclass(frozen=True)
-class BristleFriction(Effect):
+class BristleFriction(PlantEffect):
     """LuGre at a constant level T_C."""
 
     name, most = "coulomb_friction", 1.0
@@ -66,7 +66,7 @@ class BristleFriction(Effect):
 
 
 @dataclass(frozen=True)
-class BlockFriction(Effect):
+class BlockFriction(PlantEffect):
     """Maxwell's blocks at a level T_C that varies by a twentieth once a turn, as seals do."""
 
     phase: float = 0.0
@@ -87,7 +87,7 @@ class BlockFriction(Effect):
 
 
 @dataclass(frozen=True)
-class ThinningGrease(Effect):
+class ThinningGrease(PlantEffect):
     """B ω (1 + |ω|/ω₁)^(−0.2): grease that thins a little. Source: Carreau-type shear thinning."""
 
     thinning: float = 1.0  # ω₁ [rad/s]
@@ -105,7 +105,7 @@ class ThinningGrease(Effect):
 
 
 @dataclass(frozen=True)
-class FloodedBearings(Effect):
+class FloodedBearings(PlantEffect):
     """B ω₀ sign(ω) |ω/ω₀|^(2/3).
 
     Source: speed term of Palmgren (1959), Ball and Roller Bearing Engineering, 3rd ed.
@@ -128,7 +128,7 @@ class FloodedBearings(Effect):
 
 
 @dataclass(frozen=True)
-class LorentzStribeck(Effect):
+class LorentzStribeck(PlantEffect):
     """LuGre at the level T_S/(1 + (ω/ω_S)²) above the Coulomb one.
 
     Source: Lorentzian form of the Stribeck curve, Hess and Soom (1990), J. Tribology 112, 147-152.
@@ -149,7 +149,7 @@ class LorentzStribeck(Effect):
 
 
 @dataclass(frozen=True)
-class ExponentialStribeck(Effect):
+class ExponentialStribeck(PlantEffect):
     """Maxwell's blocks at the level T_S e^(−|ω|/ω_S).
 
     Source: exponential form of the falling curve, Tustin (1947), J. IEE 94(IIA), 143-151.
@@ -172,7 +172,7 @@ class ExponentialStribeck(Effect):
 
 
 @dataclass(frozen=True)
-class OneSidedGear(Effect):
+class OneSidedGear(PlantEffect):
     """The gear loses A more than its calibrated mean forward, 0.9 A less backward, at rest what it
     lost last.
     """
@@ -195,7 +195,7 @@ class OneSidedGear(Effect):
 
 
 @dataclass(frozen=True)
-class ThrustedGear(Effect):
+class ThrustedGear(PlantEffect):
     """Helical teeth push the shaft on another bearing by direction: A (¾ + ¼ |T|/T₀) more forward,
     as much less backward.
 
@@ -218,7 +218,7 @@ class ThrustedGear(Effect):
 
 
 @dataclass(frozen=True)
-class LoadedBearing(Effect):
+class LoadedBearing(PlantEffect):
     """a W₀ (W/W₀)^1.4 against rotation, at a radius r: pressed balls roll harder.
 
     Source: load term of Palmgren (1959), Ball and Roller Bearing Engineering, 3rd ed., with the
@@ -242,7 +242,7 @@ class LoadedBearing(Effect):
 
 
 @dataclass(frozen=True)
-class PlainBearing(Effect):
+class PlainBearing(PlantEffect):
     """a √(W² + DP²) r against rotation, falling by a tenth a decade of speed: a bush feels all of
     the axle's force.
 
@@ -267,7 +267,7 @@ class PlainBearing(Effect):
         return maxwell(scene.motion.omega, level, scene.motion.step)
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     BristleFriction,
     BlockFriction,
     ThinningGrease,

@@ -10,8 +10,8 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.contact import Ground
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.contact import PlantSoil
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
@@ -20,7 +20,7 @@ USUAL = 0.02  # [m/s] at which the soil was measured
 
 
 @dataclass(frozen=True)
-class DiffusiveDrying(Effect):
+class DiffusiveDrying(PlantEffect):
     """c (1 + a √(t/t₀)), t₀ the length of one run: loss limited by the soil grows with the root of
     time.
 
@@ -36,13 +36,13 @@ class DiffusiveDrying(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most * cls.sign(rng), facts.duration)
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         factor = 1.0 + self.strength * np.sqrt(scene.motion.time / self.span)
         return replace(ground, cohesion=ground.cohesion * np.maximum(factor, 0.02))
 
 
 @dataclass(frozen=True)
-class SteadyDrying(Effect):
+class SteadyDrying(PlantEffect):
     """c (1 + a t/t₀), not below a fiftieth of c, t₀ three runs long: loss limited by the air is
     steady.
 
@@ -57,13 +57,13 @@ class SteadyDrying(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most * cls.sign(rng), 3.0 * facts.duration)
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         factor = 1.0 + self.strength * scene.motion.time / self.span
         return replace(ground, cohesion=ground.cohesion * np.maximum(factor, 0.02))
 
 
 @dataclass(frozen=True)
-class PowerOfPasses(Effect):
+class PowerOfPasses(PlantEffect):
     """K Nᵃ, c N^(a/2), k N^(−a/3) on the N-th pass.
 
     Source: power law of repeated passes, Abebe, Tanaka, Yamazaki (1989), J. Terramechanics 26,
@@ -72,7 +72,7 @@ class PowerOfPasses(Effect):
 
     name, most = "multipass", 0.8
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         growth = float(scene.motion.passes) ** self.strength
         return replace(
             ground,
@@ -83,7 +83,7 @@ class PowerOfPasses(Effect):
 
 
 @dataclass(frozen=True)
-class LogarithmOfPasses(Effect):
+class LogarithmOfPasses(PlantEffect):
     """K (1 + a ln N), tan φ (1 + a/10 ln N), n (1 − a/20 ln N) on the N-th pass.
 
     Source: density grows with the logarithm of the number of passes, Koolen and Kuipers (1983),
@@ -92,7 +92,7 @@ class LogarithmOfPasses(Effect):
 
     name, most = "multipass", 1.2
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         growth = self.strength * float(np.log(scene.motion.passes))
         return replace(
             ground,
@@ -103,7 +103,7 @@ class LogarithmOfPasses(Effect):
 
 
 @dataclass(frozen=True)
-class LogarithmicRate(Effect):
+class LogarithmicRate(PlantEffect):
     """K [1 + m ln((v + v₁)/(v₀ + v₁))], v of the carriage.
 
     Source: logarithmic rate law of dry granular penetration, in place of Grahn's power law (1991).
@@ -111,13 +111,13 @@ class LogarithmicRate(Effect):
 
     name, most = "rate_dependent_sinkage", 0.2
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         gain = np.log((np.abs(scene.motion.speed) + SLOWEST) / (USUAL + SLOWEST))
         return replace(ground, modulus=ground.modulus * np.maximum(1.0 + self.strength * gain, 0.1))
 
 
 @dataclass(frozen=True)
-class RootRate(Effect):
+class RootRate(PlantEffect):
     """K [1 + m ((u/u₀)^(1/q) − 1)], u the rim's speed, q = 2 … 4.
 
     Source: Cowper and Symonds (1957), Brown University Technical Report 28: overstress goes with a
@@ -132,14 +132,14 @@ class RootRate(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, float(rng.uniform(2.0, 4.0)))
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         rate = (np.abs(scene.rim_speed) + SLOWEST) / (USUAL + SLOWEST)
         gain = rate ** (1.0 / self.root) - 1.0
         return replace(ground, modulus=ground.modulus * np.maximum(1.0 + self.strength * gain, 0.1))
 
 
 @dataclass(frozen=True)
-class CurvedSlipSinkage(Effect):
+class CurvedSlipSinkage(PlantEffect):
     """n = n₀ + s (a i + (1 − a) i²), a up to a half: slip-sinkage that bends with slip.
 
     Source: the power law of Ding et al. (2011), J. Terramechanics 48, 27-45, carried to second
@@ -154,14 +154,14 @@ class CurvedSlipSinkage(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, float(rng.uniform(0.0, 0.5)))
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         slip = np.clip(scene.slip, 0.0, 1.0)
         more = self.strength * (self.share * slip + (1.0 - self.share) * slip**2)
         return replace(ground, exponent=ground.exponent + more)
 
 
 @dataclass(frozen=True)
-class SweptSlipSinkage(Effect):
+class SweptSlipSinkage(PlantEffect):
     """Sinkage of the axle z − h ln(1 − i) (W/W₀)^½, i up to 0.8: each part of the rim that passes
     takes a layer with it, a thicker one under a heavier wheel.
 
@@ -184,7 +184,7 @@ class SweptSlipSinkage(Effect):
 
 
 @dataclass(frozen=True)
-class Stretch(Effect, ABC):
+class SoilStretch(PlantEffect, ABC):
     """c (1 + a w), tan φ (1 + b w) on a stretch of the bed; its forms give w(x)."""
 
     friction: float = 0.3  # b over a
@@ -204,7 +204,7 @@ class Stretch(Effect, ABC):
     def inside(self, place: Array) -> Array:
         """w (n,) at places on the bed (n,) [m]."""
 
-    def soil(self, ground: Ground, scene: Scene) -> Ground:
+    def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
         change = self.strength * self.inside(scene.motion.travel)
         return replace(
             ground,
@@ -214,7 +214,7 @@ class Stretch(Effect, ABC):
 
 
 @dataclass(frozen=True)
-class FlankedPatch(Stretch):
+class FlankedPatch(SoilStretch):
     """w is a trapezoid: a stretch with straight flanks, as filled in by hand."""
 
     def inside(self, place: Array) -> Array:
@@ -224,7 +224,7 @@ class FlankedPatch(Stretch):
 
 
 @dataclass(frozen=True)
-class RoundPatch(Stretch):
+class RoundPatch(SoilStretch):
     """w is a bell e^(−((x − x₀)/l)²): water that spread from one spot."""
 
     def inside(self, place: Array) -> Array:
@@ -232,7 +232,7 @@ class RoundPatch(Stretch):
         return np.asarray(np.exp(-(((place - self.middle) / self.half) ** 2)))
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     DiffusiveDrying,
     SteadyDrying,
     PowerOfPasses,

@@ -17,9 +17,9 @@ from gritd.tools.proof.blind.plant.concealed import (
     wheel,
     zeros,
 )
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 
-Forms = tuple[type[Effect], ...]
+Forms = tuple[type[PlantEffect], ...]
 
 _MODULES = (ground, rim, wheel, lugs, travel, frame, friction, drive, sensing, zeros)
 
@@ -39,7 +39,7 @@ UNLISTED = _by_name(unlisted.EFFECTS)
 ABSORBED = ("rear_contact", "shear_peak", "torque_constant_error", "force_crosstalk", "pulley_slip")
 
 
-def drawn(name: str, rng: np.random.Generator, facts: Facts) -> Effect:
+def drawn(name: str, rng: np.random.Generator, facts: Facts) -> PlantEffect:
     """An effect in one of its forms, at the largest plausible strength; form, sign and shapes by
     chance.
     """

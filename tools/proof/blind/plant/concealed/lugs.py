@@ -9,13 +9,13 @@ from typing import Self
 import numpy as np
 
 from gritd.tools.proof.blind.plant.concealed.pressure import WEIGHT, passive
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
 
 @dataclass(frozen=True)
-class Lugs(Effect, ABC):
+class Lugs(PlantEffect, ABC):
     """N lugs of height h; their forms give the force of each."""
 
     count: int = 16
@@ -121,4 +121,4 @@ class Teeth(Lugs):
         return 0.25 * self.strength * slip / (1.0 - slip) * scene.moving
 
 
-EFFECTS: tuple[type[Effect], ...] = (Blades, Teeth)
+EFFECTS: tuple[type[PlantEffect], ...] = (Blades, Teeth)

@@ -8,14 +8,14 @@ from typing import Self
 import numpy as np
 
 from gritd.tools.proof.blind.plant.contact import Rim
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.scene import Scene
 
 USUAL, SLOWEST = 0.02, 1e-3  # [m/s] speed at which the soil was measured; keeps rest finite
 
 
 @dataclass(frozen=True)
-class ThermalRate(Effect):
+class ThermalRate(PlantEffect):
     """Strength times 1 + (λ/ln 10) [asinh(u/u₀) − asinh(v₀/u₀)], u the rim's speed, v₀ = 20 mm/s,
     u₀ = 2 mm/s.
 
@@ -31,7 +31,7 @@ class ThermalRate(Effect):
 
 
 @dataclass(frozen=True)
-class PowerRate(Effect):
+class PowerRate(PlantEffect):
     """Strength times (u/v₀)^m, u the speed at which the rim slides on the soil.
 
     Source: power law of vane tests, Biscontin and Pestana (2001), Geotech. Testing J. 24, 423-429.
@@ -46,7 +46,7 @@ class PowerRate(Effect):
 
 
 @dataclass(frozen=True)
-class SharedRebound(Effect):
+class SharedRebound(PlantEffect):
     """Soil springs back by a share κ of the sinkage: cos θ₂ = 1 − κ (1 − cos θ₁).
 
     Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, wheel sinkage
@@ -60,7 +60,7 @@ class SharedRebound(Effect):
 
 
 @dataclass(frozen=True)
-class LoosenedRebound(Effect):
+class LoosenedRebound(PlantEffect):
     """κ e^(−i/i₀) (W₀/W)^0.3: sheared soil springs back less, and so does deeply pressed soil.
 
     Source: unloading of pressed soil is stiffer the deeper it was pressed, Wong (2008), Theory of
@@ -83,7 +83,7 @@ class LoosenedRebound(Effect):
 
 
 @dataclass(frozen=True)
-class RoundHump(Effect):
+class RoundHump(PlantEffect):
     """τ over its residual has a hump P (j/k) e^(1 − j/k). Source: form after Oida (1979); see
     `contact.mobilised`.
     """
@@ -95,7 +95,7 @@ class RoundHump(Effect):
 
 
 @dataclass(frozen=True)
-class BrittleHump(Effect):
+class BrittleHump(PlantEffect):
     """τ over its residual has a hump 2 P tanh(2j/k)/cosh(2j/k). Source: form after Kacigin and
     Guskov (1968); see `contact.mobilised`.
     """
@@ -107,7 +107,7 @@ class BrittleHump(Effect):
 
 
 @dataclass(frozen=True)
-class LevellingPeak(Effect):
+class LevellingPeak(PlantEffect):
     """θₘ/θ₁ = ½ + s [a + (1 − a) tanh(2 i)]: forward with slip, levelling off.
 
     Source: data of Wong and Reece (1967), J. Terramechanics 4(1), 81-98, which bend down at high
@@ -128,7 +128,7 @@ class LevellingPeak(Effect):
 
 
 @dataclass(frozen=True)
-class PressedPeak(Effect):
+class PressedPeak(PlantEffect):
     """θₘ/θ₁ = ½ + s (a + (1 − a) √i)(W/W₀)^0.2: further under a heavier wheel.
 
     Source: the peak of Onafeko and Reece (1967), J. Terramechanics 4(1), 59-80, moves with slip
@@ -152,7 +152,7 @@ class PressedPeak(Effect):
 
 
 @dataclass(frozen=True)
-class PolishedRim(Effect):
+class PolishedRim(PlantEffect):
     """The rim grips lightly pressed soil well, and heavily pressed soil less: strength times 1 −
     s σ/(σ + σ₀). See `contact.sheared`.
     """
@@ -164,7 +164,7 @@ class PolishedRim(Effect):
 
 
 @dataclass(frozen=True)
-class SlidingRim(Effect):
+class SlidingRim(PlantEffect):
     """Shear builds up in the soil as ever, but the rim slides where it comes to 1 − s of the
     strength. See `contact.mobilised`.
     """
@@ -176,7 +176,7 @@ class SlidingRim(Effect):
 
 
 @dataclass(frozen=True)
-class SkewedWheel(Effect):
+class SkewedWheel(PlantEffect):
     """The wheel's plane is turned from its travel by β: the rim slides sideways, too, and the shear
     stress has the direction of the sliding. See `contact.sheared`.
     """
@@ -188,7 +188,7 @@ class SkewedWheel(Effect):
 
 
 @dataclass(frozen=True)
-class FrictionCircle(Effect):
+class FrictionCircle(PlantEffect):
     """F_y = 0.7 W tanh 3β, and √(1 − tanh² 3β) of the wheel's grip is left along its plane.
 
     Source: one circle of friction for both directions, Schwanghart (1968), J. Terramechanics 5(1),
@@ -208,7 +208,7 @@ class FrictionCircle(Effect):
         )
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     ThermalRate,
     PowerRate,
     SharedRebound,

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.memory import lagged, mean_before
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt
@@ -18,7 +18,7 @@ FORCE = ("pull", "load", "torque")  # channels of the force sensor
 
 
 @dataclass(frozen=True)
-class TurnedSensor(Effect):
+class TurnedSensor(PlantEffect):
     """The sensor is mounted turned by a small angle, and torque bends it: DP cos ε + W sin ε + a T.
 
     Source: a sensor's frame turned about the axle, and one off-diagonal term of its matrix.
@@ -44,7 +44,7 @@ class TurnedSensor(Effect):
 
 
 @dataclass(frozen=True)
-class BendingSensor(Effect):
+class BendingSensor(PlantEffect):
     """DP + a W (1 + W/W₀)/2: the sensor bends under the load, and leaks more the more it is bent.
 
     Source: second-order term of a bending beam's matrix.
@@ -64,7 +64,7 @@ class BendingSensor(Effect):
 
 
 @dataclass(frozen=True)
-class CreepingBelt(Effect):
+class CreepingBelt(PlantEffect):
     """The belt creeps on the pulley by s + s' |F|, F what it transmits: the encoder sees less than
     the travel.
 
@@ -87,7 +87,7 @@ class CreepingBelt(Effect):
 
 
 @dataclass(frozen=True)
-class WornPulley(Effect):
+class WornPulley(PlantEffect):
     """The belt creeps by s (1 + w cos(x/r_p)): one side of the pulley grips less.
 
     Source: kinematics of a pulley of radius r_p with a worn spot.
@@ -115,7 +115,7 @@ def _unseen(felt: Felt, creep: Array) -> Felt:
 
 
 @dataclass(frozen=True)
-class Latency(Effect, ABC):
+class LateChannel(PlantEffect, ABC):
     """One channel is late; its forms say how."""
 
     channel: str = "sinkage"
@@ -138,7 +138,7 @@ class Latency(Effect, ABC):
 
 
 @dataclass(frozen=True)
-class FilteredLatency(Latency):
+class FilteredLatency(LateChannel):
     """Half by transport and half by a low-pass filter."""
 
     def late(self, values: Array, time: Array) -> Array:
@@ -150,7 +150,7 @@ class FilteredLatency(Latency):
 
 
 @dataclass(frozen=True)
-class AveragedLatency(Latency):
+class AveragedLatency(LateChannel):
     """The mean of the last 2 τ. Source: an integrating converter."""
 
     def late(self, values: Array, time: Array) -> Array:
@@ -158,7 +158,7 @@ class AveragedLatency(Latency):
         return mean_before(values, time, 2.0 * self.strength)
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     TurnedSensor,
     BendingSensor,
     CreepingBelt,

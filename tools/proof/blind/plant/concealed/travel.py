@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.memory import lagged, mean_before
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
@@ -50,7 +50,7 @@ def steps_of(scene: Scene) -> Array:
 
 
 @dataclass(frozen=True)
-class SecondOrderRelaxation(Effect):
+class SecondOrderRelaxation(PlantEffect):
     """Torque, pull and sinkage follow over λ of travel, by two lags of λ/2 one after the other.
 
     Source: relaxation length of a rolling wheel, Pacejka (2012), Tire and Vehicle Dynamics, ch. 5,
@@ -65,7 +65,7 @@ class SecondOrderRelaxation(Effect):
 
 
 @dataclass(frozen=True)
-class RollingContact(Effect):
+class RollingContact(PlantEffect):
     """Torque and pull are means over the last a r sin θ₁ of travel, the sinkage over as much again:
     soil under the rim was sheared by all slips since it was entered.
 
@@ -82,7 +82,7 @@ class RollingContact(Effect):
 
 
 @dataclass(frozen=True)
-class BowWave(Effect):
+class BowWave(PlantEffect):
     """A run begins with f W more pull, which falls as 1/(1 + s/λ)² over its way s, and with the
     wheel d i higher, d a twentieth of the radius at f = 0.1.
 
@@ -120,4 +120,4 @@ class FilledRut(BowWave):
         return np.asarray(np.clip(1.0 - path / (3.0 * self.length), 0.0, 1.0))
 
 
-EFFECTS: tuple[type[Effect], ...] = (SecondOrderRelaxation, RollingContact, BowWave, FilledRut)
+EFFECTS: tuple[type[PlantEffect], ...] = (SecondOrderRelaxation, RollingContact, BowWave, FilledRut)

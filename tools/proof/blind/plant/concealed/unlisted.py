@@ -9,13 +9,13 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Scene
 
 
 @dataclass(frozen=True)
-class CableDrag(Effect):
+class CableDrag(PlantEffect):
     """The cable chain pulls back in proportion to how far it is drawn out: DP − F x/L."""
 
     length: float = 1.0
@@ -31,7 +31,7 @@ class CableDrag(Effect):
 
 
 @dataclass(frozen=True)
-class SurfaceWaves(Effect):
+class SurfaceWaves(PlantEffect):
     """The raked bed is wavy: the potentiometer reads its height, the pull its grade."""
 
     wavelength: float = 0.15  # [m]
@@ -54,7 +54,7 @@ class SurfaceWaves(Effect):
 
 
 @dataclass(frozen=True)
-class MagneticSaturation(Effect):
+class MagneticSaturation(PlantEffect):
     """Iron saturates: torque K_t I (1 − (I/I_s)²); strength is the shortfall at the typical
     current.
     """
@@ -78,7 +78,7 @@ class MagneticSaturation(Effect):
 
 
 @dataclass(frozen=True)
-class BuildingVibration(Effect):
+class BuildingVibration(PlantEffect):
     """A slow machine next door shakes the bed: a sine in time in the drawbar pull."""
 
     period: float = 2.0  # [s]
@@ -95,7 +95,7 @@ class BuildingVibration(Effect):
 
 
 @dataclass(frozen=True)
-class RailJoint(Effect):
+class RailJoint(PlantEffect):
     """Beyond a joint of the rails the carriage runs with more friction, which the force sensor
     feels.
     """
@@ -114,7 +114,7 @@ class RailJoint(Effect):
 
 
 @dataclass(frozen=True)
-class Thixotropy(Effect):
+class Thixotropy(PlantEffect):
     """Soil at rest gains torque resistance that shearing wears off: T (1 + a e^(−s/s₀)), s the path
     of the rim.
     """
@@ -134,7 +134,7 @@ class Thixotropy(Effect):
 
 
 @dataclass(frozen=True)
-class ShearBands(Effect):
+class ShearBands(PlantEffect):
     """Soil fails in bands: torque and pull swell and fall once each time the rim has slid by l.
 
     T (1 + a g), g a saw of the sliding path over l.
@@ -159,7 +159,7 @@ class ShearBands(Effect):
 
 
 @dataclass(frozen=True)
-class CableTwist(Effect):
+class CableTwist(PlantEffect):
     """The motor's cable winds up with the wheel: torque M ψ/2π, both ways."""
 
     name, most = "cable_twist", 0.5
@@ -173,7 +173,7 @@ class CableTwist(Effect):
         return np.asarray(self.strength * scene.motion.turn / (2.0 * np.pi))
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     CableDrag,
     SurfaceWaves,
     MagneticSaturation,

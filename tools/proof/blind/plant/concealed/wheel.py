@@ -11,13 +11,13 @@ from typing import Self
 import numpy as np
 
 from gritd.tools.proof.blind.plant.concealed.pressure import WEIGHT, passive
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.scene import Felt, Motion, Scene
+from gritd.tools.proof.blind.plant.scene import Felt, Scene, TrueMotion
 
 
 @dataclass(frozen=True)
-class WallBulldozing(Effect):
+class WallBulldozing(PlantEffect):
     """DP − s b (½ γ z² K_p + 2 c z √K_p): passive earth pressure on a wall as wide as the wheel.
 
     Source: Terzaghi (1943), Theoretical Soil Mechanics, ch. 7, with Rankine's coefficient.
@@ -36,7 +36,7 @@ class WallBulldozing(Effect):
 
 
 @dataclass(frozen=True)
-class BowWaveBulldozing(Effect):
+class BowWaveBulldozing(PlantEffect):
     """DP − s b K_p (½ γ z² + q z): the heap ahead of the wheel weighs on the soil that it pushes,
     q = γ h, h the height of a heap that holds a share of the rut.
 
@@ -60,7 +60,7 @@ class BowWaveBulldozing(Effect):
 
 
 @dataclass(frozen=True)
-class RestingSidewall(Effect):
+class RestingSidewall(PlantEffect):
     """Each buried face slides as one area at its centroid, pressed by (1 − sin φ) of the rim's mean
     stress.
 
@@ -77,7 +77,7 @@ class RestingSidewall(Effect):
 
 
 @dataclass(frozen=True)
-class AdheringSidewall(Effect):
+class AdheringSidewall(PlantEffect):
     """The same faces under adhesion c and the passive pressure of the soil beside them alone.
 
     Source: adhesion and overburden on a buried face, after Osman (1964), J. Agric. Eng. Res. 9.
@@ -105,7 +105,7 @@ def _rubbed(scene: Scene, strength: Array) -> Scene:
 
 
 @dataclass(frozen=True)
-class OffsetAxle(Effect):
+class OffsetAxle(PlantEffect):
     """The axle sits e beside the middle of a round wheel: R = e cos ψ' + √(r² − e² sin² ψ'); W
     lifts with it.
     """
@@ -118,7 +118,7 @@ class OffsetAxle(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
 
-    def radius(self, radius: Array, motion: Motion) -> Array:
+    def radius(self, radius: Array, motion: TrueMotion) -> Array:
         """Radius below the axle (n,) [m], of a round wheel's (n,) [m]."""
         return self.below(radius, motion.turn)
 
@@ -164,7 +164,7 @@ class DentedRim(OffsetAxle):
 
 
 @dataclass(frozen=True)
-class Hub(Effect, ABC):
+class Hub(PlantEffect, ABC):
     """The hub runs out: it lifts the axle and drops it again, and the rim stays round. Only the
     potentiometer sees it; its forms give the wave.
     """
@@ -205,7 +205,7 @@ class KeyedHub(Hub):
 
 
 @dataclass(frozen=True)
-class ElasticInertia(Effect):
+class ElasticInertia(PlantEffect):
     """Torque J dω/dt of a rotor behind an elastic shaft: it follows within a tenth of a second.
 
     Source: two masses and a damped spring; the rotor's acceleration is the wheel's through a
@@ -234,7 +234,7 @@ class ElasticInertia(Effect):
 
 
 @dataclass(frozen=True)
-class GearedInertia(Effect):
+class GearedInertia(PlantEffect):
     """Torque J dω/dt over the gear's efficiency while it speeds up, times it while it slows down.
 
     Source: power through a gear that loses a share either way.
@@ -261,7 +261,7 @@ class GearedInertia(Effect):
 
 
 @dataclass(frozen=True)
-class WornRim(Effect):
+class WornRim(PlantEffect):
     """The wheel's radius is r (1 + e + e/10 cos 2ψ): worn, and not quite round; the configuration
     says r.
     """
@@ -274,7 +274,7 @@ class WornRim(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most * cls.sign(rng), float(rng.uniform(0.0, 2.0 * np.pi)))
 
-    def radius(self, radius: Array, motion: Motion) -> Array:
+    def radius(self, radius: Array, motion: TrueMotion) -> Array:
         """r (1 + e + e/10 cos 2ψ') (n,) [m] of radii r (n,) [m]."""
         shape = 1.0 + 0.1 * np.cos(2.0 * (motion.turn + self.phase))
         return radius * (1.0 + self.strength * shape)
@@ -284,7 +284,7 @@ class WornRim(Effect):
 
 
 @dataclass(frozen=True)
-class YieldingRim(Effect):
+class YieldingRim(PlantEffect):
     """The rim yields under load, so it rolls on r (1 + e (3/4 + W/4W₀)).
 
     Source: effective rolling radius of an elastic wheel, Pacejka (2012), Tire and Vehicle
@@ -299,13 +299,13 @@ class YieldingRim(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most * cls.sign(rng), facts.weight)
 
-    def radius(self, radius: Array, motion: Motion) -> Array:
+    def radius(self, radius: Array, motion: TrueMotion) -> Array:
         """r (1 + e (3/4 + W/4W₀)) (n,) [m] of radii r (n,) [m]; W is the weight on the axle."""
         pressed = 0.75 + 0.25 * motion.weight / self.weight
         return radius * (1.0 + self.strength * pressed)
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     WallBulldozing,
     BowWaveBulldozing,
     RestingSidewall,

@@ -8,13 +8,13 @@ from typing import Self
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt
 
 
 @dataclass(frozen=True)
-class WarmingOffset(Effect):
+class WarmingOffset(PlantEffect):
     """The amplifier reads I₀ (1 − e^(−t/τ)/5) more than there is: nearly all of it from the start,
     the rest as it warms.
     """
@@ -33,7 +33,7 @@ class WarmingOffset(Effect):
 
 
 @dataclass(frozen=True)
-class BentOffset(Effect):
+class BentOffset(PlantEffect):
     """The amplifier reads I₀ more at rest and 0.9 I₀ at the usual current: its curve is bent."""
 
     usual: float = 0.75  # [A]
@@ -50,7 +50,7 @@ class BentOffset(Effect):
 
 
 @dataclass(frozen=True)
-class RakedDatum(Effect):
+class RakedDatum(PlantEffect):
     """The potentiometer's zero is z₀ off the surface, which is raked in ridges of z₀/20."""
 
     wavelength: float = 0.03  # [m]
@@ -70,7 +70,7 @@ class RakedDatum(Effect):
 
 
 @dataclass(frozen=True)
-class ScatteredDatum(Effect):
+class ScatteredDatum(PlantEffect):
     """The zero is set anew before each run, each time z₀ off, give or take a tenth of it."""
 
     phase: float = 0.0
@@ -87,7 +87,7 @@ class ScatteredDatum(Effect):
 
 
 @dataclass(frozen=True)
-class TiltedPotentiometer(Effect):
+class TiltedPotentiometer(PlantEffect):
     """Its string runs askew: z (1 + g)(1 − z/20 z₀), z₀ the usual sinkage. Source: geometry, to
     second order.
     """
@@ -106,7 +106,7 @@ class TiltedPotentiometer(Effect):
 
 
 @dataclass(frozen=True)
-class LoadedPotentiometer(Effect):
+class LoadedPotentiometer(PlantEffect):
     """The converter loads the potentiometer's divider: z (1 + g (1 − e^(−2z/z₀))/0.86).
 
     Source: a loaded divider's curve bends; the exponential was chosen here.
@@ -126,7 +126,7 @@ class LoadedPotentiometer(Effect):
 
 
 @dataclass(frozen=True)
-class Drift(Effect, ABC):
+class Drift(PlantEffect, ABC):
     """The zero of one channel creeps with time, by `strength` over a run; its forms say how. Each
     run begins where the last one ended.
     """
@@ -173,7 +173,7 @@ class GluedDrift(Drift):
         return np.asarray(np.log1p(time / self.pace) * self.pace / self.span)
 
 
-EFFECTS: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[PlantEffect], ...] = (
     WarmingOffset,
     BentOffset,
     RakedDatum,

@@ -11,7 +11,7 @@ Three signal names are not data: `Sequence` or `Cycle` is the message counter, `
 
 A message of SAE J1939 is known by its parameter group (PGN) and the address it comes from, whatever
 its priority; where the database states the null address, by the first address that sends it. What
-differs from a wanted message in the address alone is not read, but told: `hint`.
+differs from a wanted message in the address alone is not read, but reported: `hint`.
 """
 
 from __future__ import annotations

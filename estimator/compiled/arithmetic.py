@@ -1,6 +1,6 @@
 """The arithmetic that a tick spends most of its time in, as C, where it was built.
 
-Pure Python with the same bits stands beside each function: what computes a recording does not show
+Pure Python with the same bits stands next to each function: what computes a recording does not show
 in it. `closed.c` is terramechanics/scalar.py with filter/shift.py, `algebra.c` is
 filter/estimate.py with filter/plain_engine.py, `record.c` is filter/evidence.py. A test compares
 them on drawn values.

@@ -1,6 +1,6 @@
 """The messages of a recording, found and copied by C, where it was built.
 
-numpy with the same result stands beside each function: `walk` is recording/piles.py by the message
+numpy with the same result stands next to each function: `walk` is recording/piles.py by the message
 index, `fill` is recording/tables.py. A test reads the same files by both. `crc32` is that of zlib.
 """
 

@@ -1,4 +1,4 @@
-"""The configuration file: strict YAML to `Settings`, with the effective text that is saved beside
+"""The configuration file: strict YAML to `Settings`, with the effective text that is saved next to
 every run.
 
 An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in

@@ -101,9 +101,9 @@ def _channel(unit: str) -> Section:
 
 
 SOIL = {
-    "cohesion": Key(NumberWithUnit("Pa", low=0), "c that was written beside it"),
-    "tan_phi": Key(NumberWithUnit("", above=0), "tan φ that was written beside it"),
-    "shear_modulus": Key(NumberWithUnit("m", above=0), "k that was written beside it"),
+    "cohesion": Key(NumberWithUnit("Pa", low=0), "c that was written with it"),
+    "tan_phi": Key(NumberWithUnit("", above=0), "tan φ that was written with it"),
+    "shear_modulus": Key(NumberWithUnit("m", above=0), "k that was written with it"),
     "with_cohesion": Key(ALONG_DIRECTIONS, "correlation of c with each direction"),
     "with_tan_phi": Key(ALONG_DIRECTIONS, "correlation of tan φ with each direction"),
     "with_shear_modulus": Key(ALONG_DIRECTIONS, "correlation of k with each direction"),
@@ -146,7 +146,7 @@ def _form(**values: Any) -> LearntForm:
     """Raises Impossible where no channel has any, lists do not fit together, or points coincide."""
     form = LearntForm(**values)
     if not any(form.channels):
-        raise Impossible("points", f"one at least of {', '.join(CHANNELS)} beside them")
+        raise Impossible("points", f"one at least of {', '.join(CHANNELS)} with them")
 
     for name, channel in zip(CHANNELS, form.channels, strict=True):
         if channel is not None:

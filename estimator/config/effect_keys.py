@@ -51,7 +51,7 @@ class Effects:
         return parameters(name, known)
 
 
-def parameters(name: str, known: Mapping[str, Quantity]) -> Section:
+def parameters(name: str, known: Mapping[str, NumberWithUnit]) -> Section:
     """The keys of one effect. A default is the library's own value: off for a strength, usual for
     a shape.
     """

@@ -16,7 +16,7 @@ import yaml
 
 from gritd.estimator.config import units
 from gritd.estimator.config.channels import Unlimited
-from gritd.estimator.config.discrepancy import Numbers, Rows
+from gritd.estimator.config.discrepancy import NumberList, NumberRows
 from gritd.estimator.config.effect_keys import Effects, parameters
 from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.kinds import (
@@ -24,12 +24,12 @@ from gritd.estimator.config.kinds import (
     Choice,
     Either,
     FilePath,
-    Flag,
     Integer,
     Interval,
     Kind,
-    Quantity,
+    NumberWithUnit,
     Text,
+    YesNo,
 )
 from gritd.estimator.config.schema import (
     ABSENT,
@@ -72,7 +72,7 @@ def of(kind: Kind) -> Schema:
 
 
 @of.register
-def _(kind: Quantity) -> Schema:
+def _(kind: NumberWithUnit) -> Schema:
     """With a unit it is text. Bounds are those of a number without one."""
     text: Schema = {"$ref": "#/definitions/quantity"}
     number: Schema = {"type": "number"} | _bounds(kind)
@@ -80,7 +80,7 @@ def _(kind: Quantity) -> Schema:
     return _any([*choices, {"const": UNLIMITED}] if kind.unlimited else choices)
 
 
-def _bounds(kind: Quantity) -> Schema:
+def _bounds(kind: NumberWithUnit) -> Schema:
     bounds = {"exclusiveMinimum": kind.above, "minimum": kind.low, "maximum": kind.high}
     return {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
 
@@ -91,7 +91,7 @@ def _(kind: Integer) -> Schema:
 
 
 @of.register
-def _(kind: Flag) -> Schema:
+def _(kind: YesNo) -> Schema:
     return {"type": "boolean"}
 
 
@@ -129,12 +129,12 @@ def _(kind: Interval) -> Schema:
 
 
 @of.register
-def _(kind: Numbers) -> Schema:
+def _(kind: NumberList) -> Schema:
     return _list(of(kind.number), kind.least, kind.most)
 
 
 @of.register
-def _(kind: Rows) -> Schema:
+def _(kind: NumberRows) -> Schema:
     return _list(of(kind.row), kind.least, kind.most)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from gritd.estimator.config.names import is_file_name
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, reported
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import STATES, Estimate, Vector, covariance, made
 from gritd.estimator.filter.tracker import Tracker
@@ -172,7 +172,9 @@ def _impossible(bank: Bank, settings: Settings) -> str:
     if any(bounds.inside(member).x != member.x for member in bank):
         return "it holds a soil outside the bounds of the filter"
     preparation = np.array(variances_of(settings.bed.repeatability))
-    if not all(map(_narrower, bank, prior)) or not _credible(told(bank), prior[-1], preparation):
+    if not all(map(_narrower, bank, prior)) or not _credible(
+        reported(bank), prior[-1], preparation
+    ):
         return "it holds values that no run leaves"
     return ""
 

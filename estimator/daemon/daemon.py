@@ -182,7 +182,7 @@ class Daemon:
         return left / 2 + wait_until(lambda: not loop.is_alive(), left / 2)
 
     def fail(self, reason: str) -> None:
-        """Stop, with a reason; the first one given is the one told."""
+        """Stop, with a reason; the first one given is reported."""
         self._failure = self._failure or reason
         self._stop.set()
 

@@ -3,13 +3,13 @@
 How far the equations are from a rig is not known before the run (form_error.py). A member of the
 bank is the filter with one size of that error. The density that a member gave to what was then
 measured is its evidence: where the equations fit, the smallest size foretells best; where they do
-not, a larger one does. With little driven, all of them count, and what is told is as uncertain as
-that.
+not, a larger one does. With little driven, all of them count, and what is reported is as uncertain
+as that.
 
 The equations hold where one of the FORM.holding smallest sizes explains the record: what sensors
 and arithmetic leave. Beyond, a misfit shows only in part. What c, tan φ, k and the calibrations can
 imitate they take for themselves, and of what is left out of the physics that is most. So the size
-that is seen is not that of the misfit: where any is seen, what is told is what the largest size
+that is seen is not that of the misfit: where any is seen, what is reported is what the largest size
 leaves.
 """
 
@@ -33,7 +33,7 @@ def weights(bank: Bank) -> Vector:
     return tuple([value / whole for value in each])
 
 
-def told(bank: Bank) -> Estimate:
+def reported(bank: Bank) -> Estimate:
     """What the members say together."""
     hold = weights(bank)[: FORM.holding]
     return mixed((*bank[: FORM.holding], bank[-1]), (*hold, 1.0 - total([*hold])))

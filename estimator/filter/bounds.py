@@ -12,7 +12,7 @@ from gritd.estimator.filter.tuning import TRUST
 
 
 class Bounds:
-    """The configured bounds beside the prior: mean and σ (3,)."""
+    """The configured bounds together with the prior: mean and σ (3,)."""
 
     def __init__(self, settings: Settings, mean: Vector, sigma: Vector) -> None:
         low_c, high_c = settings.filter.cohesion_bounds

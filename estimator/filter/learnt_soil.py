@@ -1,4 +1,4 @@
-"""The prior of the soil beside the discrepancy of form that was learnt with it.
+"""The prior of the soil together with the discrepancy of form that was learnt with it.
 
 A campaign shows the sum of what the equations give and δ. What of it is soil and what is δ is known
 less well than either: their errors have opposite signs. A filter that took them for independent

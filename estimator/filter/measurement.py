@@ -86,7 +86,7 @@ class Measurement:
         self._lasting = max(FORM.lasting * settings.rates.update, 1.0)
 
     def prior(self, soil: Array, size: float) -> Array:
-        """Covariance (d, d) before the run, of the soil (3, 3) and all that is estimated beside it;
+        """Covariance (d, d) before the run, of the soil (3, 3) and all that is estimated with it;
         size: of the error of form.
         """
         ones = len(self._variants) + directions_of(self.settings)

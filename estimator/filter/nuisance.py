@@ -1,4 +1,5 @@
-"""Errors that stay the same for the whole run, and that the filter estimates beside the soil.
+"""Errors that stay the same for the whole run, and that the filter estimates together with the
+soil.
 
 Each nuisance is zero mean with the standard deviation stated in the configuration. Its gradient
 says how the prediction of the measured torque and drawbar pull changes with it. Nuisances of zero

@@ -11,7 +11,7 @@ window is always used with the same memory, however many ticks came before it.
 
 from __future__ import annotations
 
-from gritd.estimator.filter.bank import Bank, misfit, told
+from gritd.estimator.filter.bank import Bank, misfit, reported
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
@@ -79,7 +79,7 @@ class Reviewer:
         return state if task is None else self._passed(state, task)
 
     def _completed(self, state: TrackState, task: Ended) -> TrackState:
-        """The stretch that has ended beside the others."""
+        """The stretch that has ended, compared with the others."""
         memory = self._smoother.completed(state.memory, state.trust.doubt)
         return state._replace(memory=memory, task=Judging(task.same))
 
@@ -183,7 +183,7 @@ class Reviewer:
         last = state.memory.stretches[-1:]
         passed, bank = self._smoother.over(base, last, state.trust.doubt)
         bank = self._bounds.all_inside(bank)
-        estimate = told(bank)
+        estimate = reported(bank)
         return state._replace(
             estimate=estimate,
             base=base,

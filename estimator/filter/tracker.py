@@ -12,7 +12,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import Account
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, reported
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
@@ -50,7 +50,7 @@ from gritd.estimator.wheel.wheel_state import (
     steady_since,
 )
 
-KNOWN = 0.7  # posterior over prior σ of ln k below which the run has told of k
+KNOWN = 0.7  # posterior over prior σ of ln k below which the run has determined k
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 
 
@@ -72,7 +72,7 @@ class Tracker:
         )
 
         self.prior_bank = self._unsure()
-        self.prior = told(self.prior_bank)
+        self.prior = reported(self.prior_bank)
         self._bounds = Bounds(settings, self.prior.x[:STATES], self._prior_sigma)
         self.smoother = Smoother(settings, self.measurement, self.engine, self.prior)
         self.reviewer = Reviewer(self.smoother, self._bounds, self._scales())
@@ -196,20 +196,20 @@ class Tracker:
         status: Status,
         aids: tuple[Aid, ...],
     ) -> Account:
-        """What is told: the filter's estimate where it is believed, else the prior and why."""
+        """What is reported: the filter's estimate where it is believed, else the prior and why."""
         separability = self.separability(state.estimate)
         standing = self.standing(state, separability)
         believed = standing == Status.TRACKING
-        told = separability if believed else 1.0
+        shown = separability if believed else 1.0
 
         return Account(
             snapshot,
             now,
             standing if status == Status.TRACKING else status,
-            int(now.flags) | self._flags(state, aids, told) | Flag.PRIOR * (not believed),
+            int(now.flags) | self._flags(state, aids, shown) | Flag.PRIOR * (not believed),
             aids,
             state.estimate if believed else self.prior,
-            told,
+            shown,
         )
 
     def standing(self, state: TrackState, separability: float) -> Status:
@@ -247,7 +247,7 @@ class Tracker:
         memory = state.memory.without_open()
         if memory is state.memory:
             return state
-        return state._replace(memory=memory, bank=state.base, estimate=told(state.base))
+        return state._replace(memory=memory, bank=state.base, estimate=reported(state.base))
 
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float
@@ -268,7 +268,7 @@ class Tracker:
         base = state.base if not begun or state.memory.dropped(memory) else state.bank
         memory, bank = self.smoother.with_open(memory, base, walked.x, trust.doubt)
         bank = self._bounds.all_inside(bank)
-        estimate = told(bank)
+        estimate = reported(bank)
         trust = self._bounds.stood(trust, estimate, elapsed) if taken else trust
 
         task = self._task(state, now, taken) if begun else None
@@ -317,7 +317,7 @@ class Tracker:
         trust = state.trust.reset()
         bank = self._unsure(trust.doubt)
         return state._replace(
-            estimate=told(bank),
+            estimate=reported(bank),
             base=bank,
             bank=bank,
             memory=Memory(bank),
@@ -338,7 +338,7 @@ class Tracker:
         return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
 
     def _knows_k(self, estimate: Estimate) -> bool:
-        """Whether the run has told of k, and not the prior alone."""
+        """Whether the run has determined k, and not the prior alone."""
         return estimate.soil_P[LN_K][LN_K] < (KNOWN * self._prior_sigma[LN_K]) ** 2
 
     def _flags(self, state: TrackState, aids: tuple[Aid, ...], separability: float) -> int:
@@ -372,8 +372,8 @@ def _memory(state: TrackState) -> float:
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
-    """What the effects may know beside the snapshot: time, estimate, rates of change, their memory,
-    the start.
+    """What the effects may know besides the snapshot: time, estimate, rates of change, their
+    memory, the start.
     """
     before = state.before
     acceleration = sinking = 0.0

@@ -1,8 +1,8 @@
 """Whether the filter's estimate is to be believed, from its innovations.
 
 What a change of the soil explains is taken care of first (change.py). What then remains is judged
-here: σ is set back to the prior's where model and measurement disagree out of all measure, and
-doubled if that does not help.
+here: σ is set back to the prior's where model and measurement disagree by more than the reset
+threshold, and doubled if that does not help.
 """
 
 from __future__ import annotations

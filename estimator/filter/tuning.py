@@ -69,7 +69,7 @@ class TrustTuning:
     wider: float = 1.5
 
     # Changes of the soil within the memory of them beyond which they explain nothing any more. A
-    # ramp of 20 s is told as a few steps, four at most.
+    # ramp of 20 s is reported as a few steps, four at most.
     restless: float = 4.0
 
     # [s] in which a change is forgotten.
@@ -101,16 +101,16 @@ class FormTuning:
 
     @property
     def own(self) -> tuple[float, ...]:
-        """For each size the error that a stretch has of its own, beside the smooth one: as large,
-        and no larger than what sensors and their filters do.
+        """For each size the error that a stretch has of its own, in addition to the smooth one: as
+        large, and no larger than what sensors and their filters do.
         """
         return tuple([min(size, self.sizes[self.holding - 1]) for size in self.sizes])
 
     @property
     def usual(self) -> float:
         """That error where the equations hold: halfway, by ratio, between the sizes that say so. A
-        change of the soil is judged beside it. Judgement: with the smaller the simulated testbed
-        shows no flag in 2 h of unchanged soil either, but sensors of other rigs add errors.
+        change of the soil is judged together with it. Judgement: with the smaller the simulated
+        testbed shows no flag in 2 h of unchanged soil either, but sensors of other rigs add errors.
         """
         return sqrt(self.own[0] * self.own[self.holding - 1])
 

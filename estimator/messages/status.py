@@ -31,10 +31,10 @@ UPDATED = (Status.TRACKING, Status.AT_BOUND, Status.DIVERGED, Status.MISMATCH)
 
 
 class Flag(IntFlag):
-    """Conditions that may hold beside the status."""
+    """Conditions that may hold in addition to the status."""
 
     NONE = 0
-    NOT_SEPARABLE = 1  # c and tan φ not told apart by the data so far: use the joint ellipse
+    NOT_SEPARABLE = 1  # c and tan φ not distinguished by the data so far: use the joint ellipse
     K_ESTIMATED = 2  # ln k is estimated; otherwise considered
     GATED = 4  # a measurement of this window failed its gate
     RESET = 8  # covariance was inflated after the innovations disagreed

@@ -44,7 +44,7 @@ class Domain:
 
 @dataclass(frozen=True)
 class LearntSoil:
-    """The soil that δ was learnt with: c [Pa], tan φ and k [m] as they were written beside it.
+    """The soil that δ was learnt with: c [Pa], tan φ and k [m] as they were written with it.
 
     with_…: correlation (r,) of each with the b_j; among: of c with tan φ, of c with k, of tan φ
     with k.

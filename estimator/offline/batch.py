@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import Account, aids, health, measurements, soil_estimate
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, reported
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.reasons import Reason, withheld
 from gritd.estimator.filter.segments import Memory
@@ -102,7 +102,7 @@ class Replayed(NamedTuple):
     @property
     def estimate(self) -> Estimate:
         """At the end: what the members of the bank say together."""
-        return told(self.bank)
+        return reported(self.bank)
 
 
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
@@ -138,7 +138,7 @@ def followed(
 
     The windows are those the loop updated the filter at: by the recording's own ticks where it has
     them, else by ticks at the configured rate. Of `flags`, those that concern single ticks (late
-    readings, counter jumps) are left out. `advance` is told after each window how many are done
+    readings, counter jumps) are left out. `advance` is given after each window how many are done
     and how many there are.
     """
     pipeline = Pipeline(settings, engine)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Repeatability, Settings
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, reported
 from gritd.estimator.filter.reasons import Reason
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.status import Flag
@@ -31,7 +31,9 @@ class BedRun(NamedTuple):
 
     @property
     def another_soil(self) -> bool:
-        """Whether the soil changed beside the runs before it, and not by itself."""
+        """Whether the soil differs from that of the runs before it, and did not change within the
+        run.
+        """
         together, alone = (
             (run.rows["flags"] & Flag.CHANGED) > 0 for run in (self.carried, self.alone)
         )
@@ -94,7 +96,7 @@ def bed_runs(
             alone,
             carried,
             after_run(known, carried.bank, repeatability, carried.memory),
-            surprise(told(start.bank), carried.estimate),
+            surprise(reported(start.bank), carried.estimate),
         )
         run = run if run.counts else run._replace(known=known)
         known = run.known

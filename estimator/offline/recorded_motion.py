@@ -29,7 +29,7 @@ def recorded_motion(recording: Recording, settings: Settings, rate: float) -> Mo
     """Arrays (n,) at `rate` [Hz]; time [s] runs from where both encoders began.
 
     The load is the wrench's where there is one, else the run's nominal load, else the configured
-    one. Raises RecordingError where an encoder is missing or never known beside the other.
+    one. Raises RecordingError where an encoder is missing or never known together with the other.
     """
     settings = settings_of_run(settings, recording.run)
     for name in ENCODERS:

@@ -17,7 +17,8 @@ from gritd.estimator.recording.tables import Fields
 from gritd.estimator.recording.topics import TICK
 
 RAW: dict[str, Fields] = {f"/raw/{channel}": None for channel in CHANNELS}
-# What `recorded_streams` takes of a recording with ticks: told to `read`, it unpacks the file once.
+# What `recorded_streams` takes of a recording with ticks: given to `read`, it unpacks the file
+# once.
 STREAMS: dict[str, Fields] = {**RAW, TICK: ("stamp",)}
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Repeatability, Settings
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, reported
 from gritd.estimator.filter.estimate import (
     KPA,
     STATES,
@@ -45,7 +45,7 @@ class Known(NamedTuple):
     @property
     def estimate(self) -> Estimate:
         """What the members of the bank say together."""
-        return told(self.bank)
+        return reported(self.bank)
 
 
 class RunStart(NamedTuple):
@@ -110,7 +110,7 @@ def begun(fresh: TrackState, start: RunStart) -> TrackState:
     """The state that a tracker starts with, with what is known in the place of the prior."""
     bank, memory = start
     memory = Memory(bank) if memory is None else memory.ended()
-    return fresh._replace(estimate=told(bank), base=bank, bank=bank, memory=memory)
+    return fresh._replace(estimate=reported(bank), base=bank, bank=bank, memory=memory)
 
 
 def surprise(before: Estimate, after: Estimate) -> float:

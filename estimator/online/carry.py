@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import told
+from gritd.estimator.filter.bank import reported
 from gritd.estimator.filter.estimate import STATES
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.track import TrackState
@@ -86,4 +86,4 @@ def _kept(track: TrackState, old: TrackState) -> TrackState:
     """The soil as it was estimated, as uncertain as the prior."""
     soil = old.estimate.x[:STATES]
     bank = tuple([member._replace(x=(*soil, *member.x[STATES:])) for member in track.bank])
-    return track._replace(estimate=told(bank), base=bank, bank=bank, memory=Memory(bank))
+    return track._replace(estimate=reported(bank), base=bank, bank=bank, memory=Memory(bank))

@@ -20,7 +20,7 @@ Check = Callable[[DrivenRun, Settings, Sources], Iterator[Contradiction]]
 def contradictions(
     run: DrivenRun, settings: Settings, sources: Sources
 ) -> tuple[Contradiction, ...]:
-    """What cannot be, each with the likeliest remedy. What follows from another is not told."""
+    """What cannot be, each with the likeliest remedy. What follows from another is left out."""
 
     def found(*checks: Check) -> tuple[Contradiction, ...]:
         return tuple(chain.from_iterable(check(run, settings, sources) for check in checks))

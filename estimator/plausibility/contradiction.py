@@ -25,7 +25,7 @@ class Contradiction(NamedTuple):
     alone: bool = True
 
 
-def told(kind: str, fact: str, likely: list[str]) -> Contradiction:
+def contradiction(kind: str, fact: str, likely: list[str]) -> Contradiction:
     """A fact, with what would put it right."""
     remedy = " or ".join(likely[:3])
     return Contradiction(f"{kind}: {remedy}", f"{fact}: {remedy}" if likely else fact)

@@ -18,10 +18,10 @@ from gritd.estimator.plausibility.contradiction import (
     LEAST,
     MOST,
     Contradiction,
+    contradiction,
     datum,
     entry_angle,
     load_of,
-    told,
 )
 from gritd.estimator.plausibility.driven import DrivenRun, RunWindows
 from gritd.estimator.plausibility.mistakes import Sources, remedies, turned
@@ -48,11 +48,11 @@ def sinkage(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Co
         likely = [
             r.words for r in remedies("sinkage", sources) if _usual(sinkage * r.factor, radius)
         ]
-        yield told(
+        yield contradiction(
             "deep", f"sinkage is {shown}, beyond the radius of {1e3 * radius:.3g} mm", likely
         )
     elif _highest(course) < -max(datum(settings), FEW * radius):
-        yield told(
+        yield contradiction(
             "above", f"sinkage is {shown} while the wheel drives", [turned("sinkage", sources)]
         )
     elif 0.0 < sinkage < BEARING * expected:
@@ -60,7 +60,7 @@ def sinkage(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Co
             r.words for r in remedies("sinkage", sources) if _usual(sinkage * r.factor, radius)
         ]
         if likely:
-            yield told(
+            yield contradiction(
                 "shallow",
                 f"sinkage is {shown}; the stated soil gives {1e3 * expected:.2g} mm",
                 likely,
@@ -99,7 +99,7 @@ def load(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contr
 
     low, usual, high = np.percentile(load, (5.0, 50.0, 95.0))
     if usual < -settings.load.minimum:
-        yield told(
+        yield contradiction(
             "negative load", f"load is {usual:.3g} N, and no soil pulls", [turned("load", sources)]
         )
         return
@@ -111,7 +111,7 @@ def load(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contr
         for remedy in remedies("load", sources)
         if abs(usual * remedy.factor / stated - 1.0) < TOLERANCE
     ]
-    yield told(
+    yield contradiction(
         "stated load", f"load is {usual:.3g} N as measured and {stated:.3g} N as stated", likely
     )
 
@@ -127,7 +127,7 @@ def torque(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Con
 
     usual = float(np.median(torque))
     if float(np.mean(torque < 0.0)) > MOST:
-        yield told(
+        yield contradiction(
             "torque",
             f"torque is {usual:.3g} N·m against the motion of a wheel that slips forward",
             [turned("torque", sources)],
@@ -155,13 +155,13 @@ def _strength(
 
     likely = [r.words for r in remedies("torque", sources) if least < usual * r.factor < most]
     if usual > (1.0 + TOLERANCE) * most:
-        yield told(
+        yield contradiction(
             "strength",
             f"torque is {usual:.3g} N·m, and soil within filter's bounds takes {most:.3g} N·m",
             likely or ["the torque, its constant, or the radius is another"],
         )
     elif 0.0 < usual < 0.1 * least and likely:
-        yield told("idle", f"torque is {usual:.2g} N·m under {load:.3g} N", likely)
+        yield contradiction("idle", f"torque is {usual:.2g} N·m under {load:.3g} N", likely)
 
 
 def pull(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
@@ -188,7 +188,7 @@ def _falling(course: RunWindows, settings: Settings, sources: Sources) -> Contra
         return None
     what = "torque over radius" if turning else "slip"
     fact = f"pull falls where {what} rises under one load, in {50 - 50 * together:.0f} % of pairs"
-    return told("falling pull", fact, [turned("pull", sources)])
+    return contradiction("falling pull", fact, [turned("pull", sources)])
 
 
 def _beyond(course: RunWindows, settings: Settings, sources: Sources) -> Contradiction | None:
@@ -217,7 +217,7 @@ def _beyond(course: RunWindows, settings: Settings, sources: Sources) -> Contrad
         likely = [turned("pull", sources)]
     low, high = float(np.median(least)), float(np.median(most))
     allowed = f"{low:.3g} to {high:.3g} N" if np.isfinite(low) else f"{high:.3g} N at most"
-    return told(
+    return contradiction(
         "pull",
         f"pull is {np.median(pull):.3g} N, where torque over radius allows {allowed}",
         likely or ["a zero, the torque's constant, or the radius is another"],

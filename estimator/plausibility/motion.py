@@ -12,9 +12,9 @@ from gritd.estimator.plausibility.contradiction import (
     LEAST,
     MOST,
     Contradiction,
+    contradiction,
     entry_angle,
     load_of,
-    told,
 )
 from gritd.estimator.plausibility.driven import DrivenRun, RunWindows
 from gritd.estimator.plausibility.mistakes import Sources, remedies, turned
@@ -34,14 +34,14 @@ RATIO = (0.02, 1.2)  # v / rω of a wheel that drives
 def clock(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
     own = run.clock
     if own.leap:
-        yield told(
+        yield contradiction(
             "leap",
             f"time jumps by {own.leap:.4g} s after {own.at:.4g} s, where rows are usually "
             f"{own.interval:.3g} s apart, while the wheel turns",
             ["a wrong stamp or missing rows"],
         )
     if not 1.0 / CHANGE < own.change < CHANGE:
-        yield told(
+        yield contradiction(
             "unit of time",
             f"the time between two rows is {own.change:.3g} times as long at the end as at the "
             "beginning: its unit changes",
@@ -51,7 +51,7 @@ def clock(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Cont
     short = 0.0 < own.duration < run.window
     if own.interval > LONGEST or short:
         fact = f"{own.duration:.3g} s in steps of {own.interval:.3g} s hold no window"
-        yield told("window", fact, _times(run, sources))
+        yield contradiction("window", fact, _times(run, sources))
 
 
 def _times(run: DrivenRun, sources: Sources) -> list[str]:
@@ -82,14 +82,16 @@ def speed(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Cont
     likely = [] if "wheel" in sources and sources["wheel"].speed else _times(run, sources)
     if rim < SLOWEST:
         if likely:
-            yield told("slow", f"the rim moves at {1e3 * rim:.3g} mm/s", likely)
+            yield contradiction("slow", f"the rim moves at {1e3 * rim:.3g} mm/s", likely)
         return
     likely = likely or [
         f"{remedy.words}, and the carriage likewise"
         for remedy in remedies("wheel", sources)
         if SLOWEST <= rim * remedy.factor <= fastest
     ]
-    yield told("fast", f"the rim moves at {rim:.3g} m/s, beyond √(g r) = {fastest:.2g} m/s", likely)
+    yield contradiction(
+        "fast", f"the rim moves at {rim:.3g} m/s, beyond √(g r) = {fastest:.2g} m/s", likely
+    )
 
 
 def hidden(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
@@ -99,7 +101,7 @@ def hidden(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Con
         return
     name = sources["wheel"].name if "wheel" in sources else "wheel"
     turns = f"the wheel turns at {1e3 * abs(np.median(rim)):.3g} mm/s of its rim"
-    yield told(
+    yield contradiction(
         "hidden",
         f"{turns}, less than 4σ of its noise",
         [f"look at {name} for jumps, or state its noise"],
@@ -111,7 +113,7 @@ def wrap(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contr
         turns = run.wrap / (2.0 * np.pi)
         source = sources["wheel"]
         remedy = f"wraps: 360 deg for {source.name}" if source.channel else "its counter's width"
-        yield told(
+        yield contradiction(
             "wrap",
             f"the wheel's angle falls back by {turns:.3g} turns in one step",
             [f"it wraps; {remedy} puts it right"],
@@ -127,14 +129,14 @@ def slip(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contr
     rim, ratio = course.rim[known], course.travel[known] / course.rim[known]
     opposed = float(np.mean((ratio < 0.0) & (ratio > -1.0)))
     if opposed > 0.5:
-        yield told(
+        yield contradiction(
             "opposed",
             "wheel and carriage run against each other, slip outside ±1",
             [turned("carriage", sources), turned("wheel", sources)],
         )
         return
     if np.all(rim < 0.0):
-        yield told(
+        yield contradiction(
             "backward",
             "wheel and carriage run backward throughout, and the filter takes forward motion alone",
             [f"{turned('wheel', sources)}, and the carriage likewise"],
@@ -143,9 +145,11 @@ def slip(run: DrivenRun, settings: Settings, sources: Sources) -> Iterator[Contr
     slip = float(np.median(course.slip[np.isfinite(course.slip)]))
     likely = _ratios(ratio, sources)
     if slip < BRAKED and _drives(course, settings):
-        yield told("braked", f"slip is {slip:.2f} while the wheel drives", likely)
+        yield contradiction("braked", f"slip is {slip:.2f} while the wheel drives", likely)
     elif slip > SPINNING and likely and sources["wheel"].unit and not _sheared(course, settings):
-        yield told("spinning", f"slip is {slip:.2f} throughout", likely)._replace(alone=False)
+        yield contradiction("spinning", f"slip is {slip:.2f} throughout", likely)._replace(
+            alone=False
+        )
 
 
 def _drives(course: RunWindows, settings: Settings) -> bool:

@@ -30,7 +30,7 @@ HEADING = (
 DASH = "–"
 
 
-def told(given: Sequence[tuple[DrivenRun, Settings]], sources: Sources) -> Iterator[str]:
+def sentences(given: Sequence[tuple[DrivenRun, Settings]], sources: Sources) -> Iterator[str]:
     """The table, then what cannot be."""
     yield from table(given)
     yield from warnings(given, sources)

@@ -70,7 +70,7 @@ class MessageHeads:
     """The good messages of one block: where their records begin in `content`, and their heads,
     shape (n,).
 
-    known: `groups`, where they are told already.
+    known: `groups`, where they are known already.
     """
 
     content: bytes

@@ -32,9 +32,9 @@ CHUNK_SIZE = 1 << 20  # [bytes] a chunk is closed at this size even if nobody fl
 class RunWriter:
     """One recording, written synchronously in the order of the calls.
 
-    `topics` come beside the raw topics and /log. The path must not exist yet. Messages gather in
-    memory until `flush`, or until a chunk is full. After an error the messages not yet written
-    are kept, and `flush` may be called again.
+    `topics` come in addition to the raw topics and /log. The path must not exist yet. Messages
+    gather in memory until `flush`, or until a chunk is full. After an error the messages not yet
+    written are kept, and `flush` may be called again.
 
     mode: the file's permissions; None leaves them to the umask.
 

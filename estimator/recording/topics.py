@@ -69,7 +69,12 @@ CHECKPOINT_TOPIC = Topic(
     ),
 )
 
-TOPICS = (TICK_TOPIC, LOOP_TOPIC, CHECKPOINT_TOPIC, UPDATE_TOPIC)  # beside the raw ones and /log
+TOPICS = (
+    TICK_TOPIC,
+    LOOP_TOPIC,
+    CHECKPOINT_TOPIC,
+    UPDATE_TOPIC,
+)  # in addition to the raw ones and /log
 TICK, CHECKPOINT = TICK_TOPIC.name, CHECKPOINT_TOPIC.name
 
 

@@ -19,7 +19,7 @@ class Pulse:
         patience: int,
         inside: Callable[[], str] = str,
     ) -> None:
-        """inside: what the thread is in just now, said beside its name; '' for nothing special."""
+        """inside: what the thread is in just now, said after its name; '' for nothing special."""
         self.name, self.inside = name, inside
         self._count, self._patience = count, patience
         self._last = count()

@@ -30,7 +30,7 @@ SOIL_STEP = 1e-4  # relative change by which the soil effects' slope is found
 
 
 class Context(NamedTuple):
-    """What the tracker knows beside the snapshot."""
+    """What the tracker knows besides the snapshot."""
 
     time: float  # [s] since the run began
     c: float  # present estimate [Pa]

@@ -23,7 +23,7 @@ from gritd.estimator.model.discrepancy import (
 from gritd.estimator.model.learnt import LearntForm, Vector
 from gritd.estimator.stages.situation import CREEP, Recall
 
-NAME = "discrepancy"  # of what is remembered, beside what effects remember by their names
+NAME = "discrepancy"  # of what is remembered, in addition to what effects remember by their names
 Three = tuple[float, float, float]  # of torque [N·m], drawbar pull [N], sinkage [m]
 
 

@@ -264,7 +264,7 @@ class Sync:
         """Bits of channels whose value does not change at all while the others show motion.
 
         An encoder is stuck when the other encoder moves and it does not change; a wheel that really
-        stands still while the carriage moves is dragged, which no update survives either. A
+        stands still while the carriage moves is dragged: updates are skipped there too. A
         potentiometer, shunt or wrench is stuck when the wheel turns and not one digit of noise
         shows, or the last digit alone, to and fro; of the wrench on any axis.
         """

@@ -17,7 +17,7 @@ from gritd.estimator.messages.readings import NS
 from gritd.estimator.wheel.geometry import slope_sigma
 
 DITHER = 0.75  # [σ of one reading] between the two values of a sensor that stands still
-ENOUGH = 8  # readings in a window without which a dither is not told from noise
+ENOUGH = 8  # readings in a window without which a dither is not distinguished from noise
 
 
 class Sample(NamedTuple):
@@ -122,8 +122,8 @@ class ChannelWindow:
 class MeanWindow(ChannelWindow):
     """Mean of an analogue channel over the window.
 
-    A sensor that stands still may dither between two values of its converter. It is told from a
-    live one by their distance, less than its noise, and by there being no third.
+    A sensor that stands still may dither between two values of its converter. It is distinguished
+    from a live one by their distance, less than its noise, and by there being no third.
     """
 
     def _leaves_last(self, value: float) -> bool:

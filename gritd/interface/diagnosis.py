@@ -87,7 +87,7 @@ def diagnose(
     quick: a first answer, for which only the likeliest effects are fitted, each alone.
     other_rig: config may be of another testbed than the runs.
     online: the on-line filter runs over them too, by config and by what was found.
-    step: is told what begins.
+    step: is given what begins.
 
     Raises ValueError without runs, CommandError and ConfigError; one line.
     """

@@ -1,4 +1,4 @@
-"""What this computer does to any loop: one that only sleeps, beside the daemon's, on its core and
+"""What this computer does to any loop: one that only sleeps, next to the daemon's, on its core and
 before it.
 
     python -m gritd.tools.bench.control HERTZ FILE.npy

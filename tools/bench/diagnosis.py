@@ -27,8 +27,8 @@ RUNS = (2, 4, 8, 24)
 ON_CORES = 6, 2  # runs that are diagnosed by so many processes on as many cores
 LENGTHS = (300.0, 600.0, 1200.0)  # [s] of one run
 
-# Memory is told by the process itself: by wait4 it would be that of whoever started it, where that
-# is the larger.
+# Memory is measured by the process itself: by wait4 it would be that of whoever started it, where
+# that is the larger.
 _MEASURED = """
 import json, os, sys, time
 began, cores = time.perf_counter(), int(sys.argv[1])

@@ -39,11 +39,11 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
     """
     folder.mkdir()
     stop = StopRequest()
-    told = ["--seconds", str(BEFORE + seconds + SPARE), "--folder", str(folder), "--wait"]
-    told += ["--can", "slcan", "--config", str(configuration or packaged())]
+    options = ["--seconds", str(BEFORE + seconds + SPARE), "--folder", str(folder), "--wait"]
+    options += ["--can", "slcan", "--config", str(configuration or packaged())]
     rate, noted = load(configuration or packaged()).settings.rates.tick, folder / "control.npy"
 
-    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
+    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *options) as testbed:
         config = testbed.wait_for("configuration ", READY).split(" ", 1)[1]
         testbed.tell("play")
         time.sleep(BEFORE)

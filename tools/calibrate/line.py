@@ -11,8 +11,8 @@ from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import FAILED, CommandError
 
-SCATTER = 3.0  # residuals so many times what is expected, or more, are told
-BEND = 4.0  # [σ] at which a bend is told
+SCATTER = 3.0  # residuals so many times what is expected, or more, are reported
+BEND = 4.0  # [σ] at which a curvature is reported
 FLAT = 5.0  # [σ] of the slope, below which the readings do not follow the known values
 
 
@@ -22,7 +22,7 @@ class Point:
 
     raw:   the mean of the readings, with its standard deviation.
     known: SI, with the standard deviation of what it was set by.
-    notes: what is to be told of the readings.
+    notes: what is to be reported of the readings.
     """
 
     raw: Uncertain
@@ -109,12 +109,12 @@ def _warnings(known: Array, raw: Array, sigma: Array, excess: float) -> list[str
     """What makes the line doubtful."""
     if known.size == 2:
         return ["two points fit every line: a third would show whether it is one"]
-    told = []
+    notes = []
     if excess > SCATTER:
-        told.append(f"the residuals are {excess:.1f} times what noise and known values explain")
+        notes.append(f"the residuals are {excess:.1f} times what noise and known values explain")
     if known.size >= 4 and (bend := _bend(known, raw, sigma * max(excess, 1.0))) > BEND:
-        told.append(f"the readings bend away from a line, {bend:.0f} σ")
-    return told
+        notes.append(f"the readings bend away from a line, {bend:.0f} σ")
+    return notes
 
 
 def _bend(known: Array, raw: Array, sigma: Array) -> float:

@@ -44,7 +44,7 @@ class Live:
         """Raises CommandError where the sensor says nothing."""
         with reading(self.settings) as drain:
             read = [self._one(drain, signal, value) for value in known]
-        spiky = spikes.told(np.concatenate([found for _, found in read]), signal.channel)
+        spiky = spikes.note(np.concatenate([found for _, found in read]), signal.channel)
         return points_of([one for one, _ in read], known, signal, spiky)
 
     def touches(self, signal: Signal, count: int) -> list[float]:
@@ -93,7 +93,7 @@ class Live:
         line.clear()
         read = np.array(values)
         found = spikes.spikes(read)
-        spikes.told(found, signal.channel)
+        spikes.note(found, signal.channel)
         return np.array(stamps)[~found] / NS, read[~found], found
 
 

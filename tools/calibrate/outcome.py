@@ -30,7 +30,7 @@ class CalibrationOutcome:
     """Everything one calibration found.
 
     sensor: path of the mapping that gets date and serial number; none where no sensor was.
-    lines:  what is told of the data, before the values.
+    lines:  what is reported of the data, before the values.
     """
 
     values: tuple[CalibratedKey, ...]
@@ -40,7 +40,7 @@ class CalibrationOutcome:
     fits: tuple[tuple[str, CalibrationLine], ...] = field(default=())
 
     def text(self, before: EditedYaml) -> str:
-        """For a person: data, values beside what the configuration had, warnings."""
+        """For a person: data, values next to those of the configuration, warnings."""
         rows = [
             f"{'.'.join(each.path)}: {_shown(each, before)}"
             + (f" (was {was})" if (was := _was(before, each.path)) else "")

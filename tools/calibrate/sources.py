@@ -107,8 +107,8 @@ def series(recorded: Recording, signal: Signal) -> tuple[Array, Array, str]:
     rows = rows[np.argsort(rows["stamp"], kind="stable")]
     seconds, values = (rows["stamp"] - rows["stamp"][0]) * 1e-9, rows[signal.field].astype(float)
     found = spikes.spikes(values)
-    told = spikes.told(found, signal.channel, f"{recorded.path}: ")
-    return seconds[~found], values[~found], told
+    line = spikes.note(found, signal.channel, f"{recorded.path}: ")
+    return seconds[~found], values[~found], line
 
 
 def start_of(recorded: Recording, signal: Signal) -> float:

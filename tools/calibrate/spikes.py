@@ -1,5 +1,5 @@
 """Single readings far from their neighbours: a loose contact, a bit that flips. They are left out,
-and told.
+and reported.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     return far
 
 
-def told(found: NDArray[np.bool_], channel: str, where: str = "") -> str:
+def note(found: NDArray[np.bool_], channel: str, where: str = "") -> str:
     """A line on the spikes that are left out; '' without any. Raises CommandError where they are no
     single ones.
     """

@@ -73,7 +73,7 @@ class Child:
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         with (
             suppress(CommandError) if kind else nullcontext()
-        ):  # what went wrong first is what is told
+        ):  # what went wrong first is what is reported
             self.stop()
 
     @property

@@ -115,8 +115,8 @@ def _asked(client: Any, address: str) -> tuple[list[str], list[str]]:
     others = [worker for worker, one in found.items() if one != identity()]
     for worker in others:
         one = found[worker]
-        told = f"has {_words(one)}; here {_words(identity())}" if one else "does not answer"
-        print(f"gritd: note: worker {worker} is left out: {told}", file=sys.stderr)
+        reason = f"has {_words(one)}; here {_words(identity())}" if one else "does not answer"
+        print(f"gritd: note: worker {worker} is left out: {reason}", file=sys.stderr)
 
     if others and len(others) == len(found):
         expected = "one at least with this gritd and Python"

@@ -55,9 +55,9 @@ def open_to_all(source: Path, settings: Settings) -> list[str]:
     its CAN buses.
     """
     databases = {Path(device.dbc) for device in settings.devices.values() if device.dbc}
-    told = [_open_to_all(source, "which devices are opened and where files go")]
-    told += [_open_to_all(path, "what the messages mean") for path in sorted(databases)]
-    return [line for line in told if line]
+    lines = [_open_to_all(source, "which devices are opened and where files go")]
+    lines += [_open_to_all(path, "what the messages mean") for path in sorted(databases)]
+    return [line for line in lines if line]
 
 
 def _open_to_all(path: Path, power: str) -> str:
@@ -103,7 +103,7 @@ def writable(path: Path, replaced: bool = False) -> Path:
 
 
 def _check_folder(path: Path) -> None:
-    """Raises CommandError where no file can be made in the folder of `path`: one without a name is
+    """Raises CommandError where no file can be made in the folder of `path`: an unnamed one is
     made there, since permissions do not tell of every file system.
     """
     folder = path.parent

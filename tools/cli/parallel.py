@@ -37,7 +37,7 @@ def each(
     where a child ended otherwise: a Pool would begin another child in its place for ever.
 
     kept: large objects that results hold and that are here already. They come back as they are
-    here, not as copies. done: is told how many are.
+    here, not as copies. done: is given how many are.
     """
     if jobs < 2 or len(items) < 2 or is_scarce():
         return _counted((work(item) for item in items), done)

@@ -12,7 +12,7 @@ from types import TracebackType
 from gritd.tools.cli.terminal import LiveLine
 
 QUIET = 2.0  # [s] nothing is shown before
-FEW = 0.01  # share done from which the time left is told
+FEW = 0.01  # share done from which the time left is stated
 EVERY = {True: 0.2, False: 5.0}  # [s] between lines on a terminal, and elsewhere
 
 

@@ -1,5 +1,5 @@
 """`gritd bench`: what a tick, a replay, a force, a filter update, a message and a start cost here,
-beside what others take for the same.
+compared with what others take for the same.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def report(figures: dict[str, Figures]) -> str:
             f"quadrature {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
             f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: "
-            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} errors beside the soil); filterpy alone "
+            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} errors and the soil); filterpy alone "
             f"{_µs(u['filterpy_alone'])}: ratio {u['over_filterpy_alone']:.1f}",
             f"recording  a message: write {_µs(m['write'])}, "
             f"read as arrays {_µs(m['read_as_arrays'])}, "

@@ -1,5 +1,5 @@
-"""`gritd calibrate WHAT`: known values beside what a sensor reads, and the configuration with scale
-and offset ± σ.
+"""`gritd calibrate WHAT`: known values against what a sensor reads, and the configuration with
+scale and offset ± σ.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def _encoders(arguments: argparse.Namespace, settings: Settings) -> CalibrationO
 
 
 def _datum(arguments: argparse.Namespace, settings: Settings) -> CalibrationOutcome:
-    """Touches told by the load in a recording, by the user live or as --step."""
+    """Touches given by the load in a recording, by the user live or as --step."""
     if arguments.recorded is None:
         live = _live(arguments, settings, "mm")
         return datum.outcome(live.touches(datum.POT, arguments.touches), settings)
@@ -201,7 +201,7 @@ def _check_wrench(channel: str, settings: Settings) -> None:
 def _known(
     arguments: argparse.Namespace, settings: Settings, shown: str
 ) -> tuple[list[Uncertain], CalibrationSource]:
-    """The known values, and where the readings beside them come from. Raises CommandError."""
+    """The known values, and where their readings come from. Raises CommandError."""
     unit = _si(shown)
     sigma = known_value(arguments.known_sigma, unit) if arguments.known_sigma else 0.0
     if arguments.step and arguments.recorded is None:
@@ -362,7 +362,7 @@ def _add_own(name: str, command: argparse.ArgumentParser) -> None:
         command.add_argument(
             "--sensor",
             action="store_true",
-            help="with --from: torque constant from the wrench beside the current",
+            help="with --from: torque constant from the wrench and the current",
         )
 
 

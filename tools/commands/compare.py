@@ -106,8 +106,8 @@ def compare(
     other_rig: bool = False,
     command: Sequence[str] = (),
 ) -> Comparison:
-    """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing
-    can be compared, or where the configuration is of another testbed and that is not meant.
+    """Recordings compared with their simulation. Raises CommandError where one cannot be read or
+    nothing can be compared, or where the configuration is of another testbed and that is not meant.
     """
     settings = configuration.settings
     recordings = read_all(paths)

@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def words() -> dict[str, list[str]]:
-    """Command → what may follow it beside files: its options, and for some its names."""
+    """Command → what may follow it besides files: its options, and for some its names."""
     options = {name: sorted(options_of(parser_of(name))) for name in COMMANDS}
     options["effects"] += list(EFFECTS)
     options["completion"] += list(HOW)

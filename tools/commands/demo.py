@@ -63,7 +63,7 @@ def build_parser() -> Parser:
 
 def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
     """Testbed and daemon side by side for the given time; the daemon's closing lines."""
-    told = [
+    options = [
         "--seconds",
         str(arguments.seconds),
         "--seed",
@@ -71,9 +71,9 @@ def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
         "--plant",
         arguments.plant,
     ]
-    told += ["--folder", str(folder), "--can", arguments.can, "--wait"]
+    options += ["--folder", str(folder), "--can", arguments.can, "--wait"]
 
-    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
+    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *options) as testbed:
         config = _after(testbed.wait_for("configuration ", READY))
         print(
             f"{arguments.plant} plant, seed {arguments.seed}, {arguments.seconds:g} s; "

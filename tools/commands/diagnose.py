@@ -122,7 +122,9 @@ def _one(arguments: argparse.Namespace) -> int:
             online=arguments.online,
         )
 
-    _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
+    _write(
+        arguments, _with_runs(arguments, diagnosis, arguments.files, configuration), configuration
+    )
     print(text(diagnosis))
     return DAMAGED if damage else DONE
 
@@ -138,7 +140,7 @@ def _command(arguments: argparse.Namespace, seed: int) -> str:
     return shlex.join(["gritd", "diagnose", *words])
 
 
-def _told(
+def _with_runs(
     arguments: argparse.Namespace,
     diagnosis: Diagnosis,
     files: Sequence[Path],
@@ -149,8 +151,8 @@ def _told(
         return diagnosis
     lab = importlib.import_module("gritd.tools.report.lab")
 
-    told: Diagnosis = lab.with_runs(diagnosis, files, configuration)
-    return told
+    diagnosed: Diagnosis = lab.with_runs(diagnosis, files, configuration)
+    return diagnosed
 
 
 def _again(arguments: argparse.Namespace) -> int:
@@ -177,7 +179,9 @@ def _again(arguments: argparse.Namespace) -> int:
             online=arguments.online,
         )
 
-    _write(arguments, _told(arguments, diagnosis, list(then.files), configuration), configuration)
+    _write(
+        arguments, _with_runs(arguments, diagnosis, list(then.files), configuration), configuration
+    )
     differs = list(record.differences(then, record.Record.of(diagnosis)))
     print(text(diagnosis))
     for line in record.changed_versions(then):
@@ -238,7 +242,7 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
 
 
 def _tell_written(arguments: argparse.Namespace) -> None:
-    """A line a file; of a configuration that was changed in its place `_apply` has told."""
+    """A line a file; of a configuration that was changed in its place `_apply` has reported."""
     applied = None if arguments.in_place else arguments.apply
     for path in filter(None, (arguments.json, arguments.report, applied)):
         print(f"wrote {path}", file=sys.stderr)
@@ -374,7 +378,7 @@ def _steps_of(progress: Progress, referred: bool) -> Callable[[str], None]:
 
 
 def _done_of_pair(what: str) -> float:
-    """Share of the time that is over, of a campaign beside a reference."""
+    """Share of the time that is over, of a campaign with a reference."""
     if what.startswith(OF_REFERENCE):
         own = _done(DONE_BEFORE, what.removeprefix(OF_REFERENCE))
         return own * next(iter(DONE_BESIDE_REFERENCE.values()))

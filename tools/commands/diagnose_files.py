@@ -36,8 +36,8 @@ def of_files(
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError.
 
-    step: is told what begins; jobs: processes; command: what does the same again in a shell; quick:
-    a first answer.
+    step: is given what begins; jobs: processes; command: what does the same again in a shell;
+    quick: a first answer.
     own_rig: recordings of another testbed than the configuration's are refused; online: the on-line
     filter runs over them too, before and after.
     """
@@ -60,7 +60,7 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         soil = any(constant.soil for constant in rig.constants)
-        # long recordings are large: they are let go, and read again where they are needed
+        # long recordings are large: they are released, and read again where they are needed
         work = partial(filtered, configuration, recordings, soil) if online else Filtered
         del recordings, known
         with meanwhile(jobs, work) as before:

@@ -52,14 +52,14 @@ def _shown(diagnosis: Diagnosis) -> list[Hypothesis]:
 
 
 def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> str:
-    """Beside accepted names the others are rivals; without any, they are no explanation."""
+    """Where names are accepted, the others are rivals; without any, they are no explanation."""
     chance = f"probability {of.probability:.{DIGITS}f}"
     other = "rival" if diagnosis.accepted else "not accepted"
     head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
     head += f", form off by {of.other_forms:.0%}" if of.other_forms else ""
     values = _listed(of.parameters)
     others = of.indistinguishable_from
-    alike = f"; cannot be told apart from {', '.join(others)}" if others else ""
+    alike = f"; cannot be distinguished from {', '.join(others)}" if others else ""
     return f"{head}{f': {values}' if values else ''}{alike}"
 
 
@@ -101,7 +101,7 @@ def _fit(fit: Fit) -> Iterator[str]:
 
 
 def _foreseen(following: NextExperiment, verdict: str) -> str:
-    gain, told = following.expected_gain_nats, ""
+    gain, ending = following.expected_gain_nats, ""
     if following.separates:
-        told = f": {to_tell(verdict, following.separates)}"
-    return f"{told} (expected gain {gain:.0f} nats)" if math.isfinite(gain) else told
+        ending = f": {to_tell(verdict, following.separates)}"
+    return f"{ending} (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ending

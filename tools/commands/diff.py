@@ -25,7 +25,7 @@ def main(argv: Sequence[str]) -> int:
     if arguments.json:
         print(json.dumps([{**vars(each), "matters": each.matters} for each in found], indent=2))
     else:
-        print("\n".join(visible(line) for line in told(found)))
+        print("\n".join(visible(line) for line in in_lines(found)))
     return DONE
 
 
@@ -40,7 +40,7 @@ def made(path: Path) -> Recording:
         raise CommandError(f"{path}: found {found}; expected a recording", USAGE) from None
 
 
-def told(found: Sequence[Difference]) -> Iterator[str]:
+def in_lines(found: Sequence[Difference]) -> Iterator[str]:
     """First what may give another estimate."""
     if not found:
         yield "no difference in configuration, run and versions"

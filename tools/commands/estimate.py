@@ -1,5 +1,5 @@
-"""`gritd estimate FILE…`: what runs on one bed know together of its soil, beside what each knows
-alone.
+"""`gritd estimate FILE…`: what runs on one bed know together of its soil, compared with what each
+knows alone.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def settings_of(configuration: Configuration, recording: Recording) -> Settings:
 
 def check_same_rig(given: Sequence[Settings], recordings: Sequence[Recording]) -> None:
     """Raises CommandError where two runs differ in prior, calibration or effects: errors that are
-    the same in all of them could not be told from those that are not.
+    the same in all of them could not be distinguished from those that are not.
     """
     first = fingerprint(given[0])
 
@@ -293,7 +293,7 @@ def _strained(runs: Sequence[BedRun]) -> Iterator[str]:
 
 def _write(path: Path, runs: Sequence[BedRun], repeatability: Repeatability) -> None:
     """Raises CommandError."""
-    told = {
+    content = {
         "repeatability": vars(repeatability),
         "runs": [_run_json(run) for run in runs],
         "believed": not doubted(runs).why,
@@ -301,7 +301,7 @@ def _write(path: Path, runs: Sequence[BedRun], repeatability: Repeatability) -> 
         "together": _json(runs[-1].known),
     }
     try:
-        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:
         raise CommandError(f"{path}: {(error.strerror or '').lower()}", USAGE) from None
 

@@ -15,7 +15,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.plausibility.mistakes import OF_A_RECORDING
 from gritd.estimator.plausibility.recorded import driven_recording
-from gritd.estimator.plausibility.words import told as told_of_runs
+from gritd.estimator.plausibility.words import sentences
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import Recording
@@ -41,12 +41,12 @@ def main(argv: Sequence[str]) -> int:
             progress.at(path.name)
             recordings = [files.recording(part) for part in parts(path)]
             progress.advance()
-            print("\n".join(told(recordings)), end="\n\n" if len(given) > 1 else "\n")
+            print("\n".join(in_lines(recordings)), end="\n\n" if len(given) > 1 else "\n")
             damaged |= any(recording.damage for recording in recordings)
     return DAMAGED if damaged else DONE
 
 
-def told(recordings: Sequence[Recording]) -> Iterator[str]:
+def in_lines(recordings: Sequence[Recording]) -> Iterator[str]:
     """A run over all its parts, in lines."""
     first, of_run = recordings[0], summary(recordings)
     size = sum(recording.path.stat().st_size for recording in recordings)
@@ -81,7 +81,7 @@ def _run(recording: Recording) -> Iterator[str]:
     run = recording.run
     load = "load not stated" if run.nominal_load is None else f"load {run.nominal_load:g} N"
     yield (
-        f"run            {run.name or 'without a name'}, {load}, pass {run.pass_number}, "
+        f"run            {run.name or 'unnamed'}, {load}, pass {run.pass_number}, "
         f"start {run.start_position:g} m"
     )
 
@@ -129,9 +129,9 @@ def _driven(first: Recording) -> Iterator[str]:
     try:
         settings = loads(first.config_yaml, str(first.path)).settings
         given = [driven_recording(first, settings)]
-    except (ConfigError, RecordingError):  # told elsewhere
+    except (ConfigError, RecordingError):  # reported elsewhere
         return
-    yield from told_of_runs(given, OF_A_RECORDING)
+    yield from sentences(given, OF_A_RECORDING)
     yield ""
 
 

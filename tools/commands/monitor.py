@@ -15,7 +15,7 @@ from typing import Any
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.terminal import control
 from gritd.tools.cli.wording import honesty
-from gritd.tools.service.client import Report, add_socket, connected, reports, told
+from gritd.tools.service.client import Report, add_socket, connected, in_lines, reports
 from gritd.tools.service.wording import SHOWN, age, disagreement
 
 EVERY = 0.2  # [s] between pictures
@@ -36,7 +36,7 @@ def main(argv: Sequence[str]) -> int:
 
     with connected(arguments.socket) as connection:
         if arguments.once or not redrawable():
-            print("\n".join(told(lines, next(reports(connection)))))
+            print("\n".join(in_lines(lines, next(reports(connection)))))
             return DONE
 
         with screen() as show, keys() as pressed:
@@ -94,7 +94,7 @@ def screen() -> Iterator[Callable[[Report], None]]:
 
 def _redraw(report: Report) -> None:
     size = os.get_terminal_size()
-    kept = [_fitting(line, size.columns) for line in told(lines, report)][: size.lines]
+    kept = [_fitting(line, size.columns) for line in in_lines(lines, report)][: size.lines]
     picture = HOME + f"{CLEAR_LINE}\n".join(kept) + CLEAR_LINE + CLEAR_BELOW
     print(picture, end="", file=control(sys.stdout), flush=True)
 

@@ -75,7 +75,7 @@ def _some_of(option: str, text: str, known: tuple[str, ...]) -> tuple[str, ...]:
 
 def _run(specs: Sequence[trial.WorkerSpec], arguments: argparse.Namespace, seals: Path) -> None:
     left = sum(not spec.done for spec in specs)
-    told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
+    known = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
     with (
         seals.open("a", encoding="utf-8") as published,
         workers(arguments.jobs, cluster_of(arguments)) as (executor, width),
@@ -83,7 +83,7 @@ def _run(specs: Sequence[trial.WorkerSpec], arguments: argparse.Namespace, seals
     ):
 
         def sealed(spec: trial.WorkerSpec, digest: str) -> None:
-            if digest not in told:
+            if digest not in known:
                 published.write(f"{spec.name} {digest}\n")
                 published.flush()
 

@@ -44,7 +44,7 @@ from gritd.tools.commands import replay_jobs
 from gritd.tools.commands.estimate import check_same_rig, lines
 from gritd.tools.commands.readiness import never_ready
 from gritd.tools.commands.replay_report import Rows, report
-from gritd.tools.commands.replay_run import rerun_of, run_settings, ticks_of, told
+from gritd.tools.commands.replay_run import announced_settings, rerun_of, run_settings, ticks_of
 from gritd.tools.commands.replay_verify import verify
 from gritd.tools.diagnose.explain.provenance import check_rig
 
@@ -166,7 +166,7 @@ def _recompute(
     if arguments.output or len(recordings) > 1 or reloaded:
         rows, each, reason = _every_tick(recordings, configuration, arguments), "ticks", Reason()
     else:
-        settings = told(first, configuration, first)
+        settings = announced_settings(first, configuration, first)
         with Progress(f"replaying {first.path.name}") as progress:
             made = replayed(settings, first, settings.filter.engine, advance=progress.reached)
         rows, each, reason = made.rows, "windows", made.reason

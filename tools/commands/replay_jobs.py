@@ -36,13 +36,13 @@ def each(paths: Sequence[Path], one: One, jobs: int) -> int:
     with workers(min(jobs, len(paths)), None) as (pool, _):
         waiting = [pool.submit(_printed, one, path) for path in paths]
         try:
-            return _told(waiting)
+            return _printed_in_order(waiting)
         finally:
             for future in waiting:
                 future.cancel()
 
 
-def _told(waiting: Sequence[Future[Printed]]) -> int:
+def _printed_in_order(waiting: Sequence[Future[Printed]]) -> int:
     """Print what is said in order, up to the first error."""
     code = DONE
 

@@ -1,4 +1,4 @@
-"""What the filter made of a recording, in a few lines: soil, status, measured beside predicted."""
+"""What the filter made of a recording, in a few lines: soil, status, measured against predicted."""
 
 from __future__ import annotations
 

@@ -19,11 +19,13 @@ def rerun_of(recordings: list[Recording], configuration: Configuration, as_it_ra
     """
     first = recordings[0]
     recorded = first if not as_it_ran or not first.counts["/tick"] else None
-    told(first, configuration, recorded)
+    announced_settings(first, configuration, recorded)
     return Rerun(configuration, lambda given: run_settings(first, given, recorded))
 
 
-def told(first: Recording, configuration: Configuration, recorded: Recording | None) -> Settings:
+def announced_settings(
+    first: Recording, configuration: Configuration, recorded: Recording | None
+) -> Settings:
     """The settings of a run; says so where they do without a configured sensor."""
     settings = run_settings(first, configuration, recorded)
     if settings.wrench is None and configuration.settings.wrench is not None:

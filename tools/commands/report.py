@@ -42,28 +42,30 @@ def main(argv: Sequence[str]) -> int:
     if arguments.figure:
         require("matplotlib", "--figure")
 
-    told = _campaign(arguments, ["gritd", "report", *argv])
+    reported = _campaign(arguments, ["gritd", "report", *argv])
     try:
-        _write(told, arguments, output)
+        _write(reported, arguments, output)
     except OSError as error:
         raise CommandError(f"{output}: {(error.strerror or '').lower()}", USAGE) from None
     print(output)
 
-    read = [run.run.recording for run in told.runs]
+    read = [run.run.recording for run in reported.runs]
     damage = [f"{r.path}: {line}" for r in read for line in r.damage]
     print("".join(f"{visible(line)}\n" for line in damage), end="", file=sys.stderr)
     return DAMAGED if damage else DONE
 
 
-def _write(told: campaign.ReportedCampaign, arguments: Namespace, output: Path) -> None:
+def _write(reported: campaign.ReportedCampaign, arguments: Namespace, output: Path) -> None:
     """Raises OSError; CommandError where there is nothing to draw."""
     if not arguments.figure:
-        text = json.dumps(numbers(told), indent=1) if arguments.json else campaign.render(told)
+        text = (
+            json.dumps(numbers(reported), indent=1) if arguments.json else campaign.render(reported)
+        )
         output.write_text(text, encoding="utf-8")
         return
 
     try:
-        importlib.import_module("gritd.tools.report.forces").draw(output, told)
+        importlib.import_module("gritd.tools.report.forces").draw(output, reported)
     except ValueError as error:
         raise CommandError(f"{arguments.files[0]}: {error}; nothing is drawn", FAILED) from None
 
@@ -99,7 +101,7 @@ def build_parser() -> Parser:
     parser = Parser(
         prog="gritd report",
         description=(
-            "Write a page on runs of one bed: forces beside the equations, estimates, sensors."
+            "Write a page on runs of one bed: forces against the equations, estimates, sensors."
         ),
     )
 

@@ -1,4 +1,4 @@
-"""`gritd reproduce`: the figures of Shibly, Iagnemma and Dubowsky (2005) beside ours."""
+"""`gritd reproduce`: the figures of Shibly, Iagnemma and Dubowsky (2005) next to ours."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def build_parser() -> Parser:
-    parser = Parser(prog="gritd reproduce", description="The paper's figures beside ours.")
+    parser = Parser(prog="gritd reproduce", description="The paper's figures next to ours.")
     parser.add_argument(
         "--simulations", type=whole(1), default=SIMULATIONS, help=f"default: {SIMULATIONS}"
     )

@@ -47,7 +47,7 @@ WIDEST = 40  # letters of a column
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0; 3 where a file cannot be read, which is told. Raises CommandError."""
+    """Exit 0; 3 where a file cannot be read, which is reported. Raises CommandError."""
     arguments = build_parser().parse_args(argv)
     if not arguments.folder.is_dir():
         raise CommandError(
@@ -60,7 +60,7 @@ def main(argv: Sequence[str]) -> int:
     if arguments.json:
         print(json.dumps([_plain(each) for each in kept], indent=2))
     else:
-        print("\n".join(told(kept, arguments.folder)))
+        print("\n".join(in_lines(kept, arguments.folder)))
 
     print("".join(f"gritd: {line}\n" for line in unread), end="", file=sys.stderr)
     return DAMAGED if unread else DONE
@@ -79,7 +79,7 @@ def _read(paths: Sequence[Path]) -> tuple[list[RunEntry], list[str]]:
     return entries, unread
 
 
-def told(entries: Sequence[RunEntry], folder: Path) -> Iterator[str]:
+def in_lines(entries: Sequence[RunEntry], folder: Path) -> Iterator[str]:
     """A table."""
     rows = [HEAD, *(_row(each, folder) for each in entries)]
     widths = [max(len(row[at]) for row in rows) for at in range(len(HEAD))]

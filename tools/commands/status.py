@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gritd.tools.cli.command import DONE, FAILED, Parser
-from gritd.tools.service.client import Report, add_socket, connected, reports, told
+from gritd.tools.service.client import Report, add_socket, connected, in_lines, reports
 from gritd.tools.service.wording import disagreement
 
 # metric -> (type, help, path in the report)
@@ -75,7 +75,7 @@ def build_parser() -> Parser:
 def _text(arguments: Namespace, report: Report) -> str:
     if arguments.json:
         return json.dumps(report, indent=2)
-    return "\n".join(told(prometheus if arguments.prometheus else summary, report))
+    return "\n".join(in_lines(prometheus if arguments.prometheus else summary, report))
 
 
 # --- the forms ---

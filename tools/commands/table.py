@@ -45,7 +45,7 @@ COMMANDS = {
     "bed": ("gritd.tools.commands.bed", "the bed on which the daemon's runs add up: show, new"),
     "report": (
         "gritd.tools.commands.report",
-        "a page for the lab book: forces beside the equations, estimates, sensors",
+        "a page for the lab book: forces against the equations, estimates, sensors",
     ),
     "diagnose": (
         "gritd.tools.commands.diagnose",
@@ -68,14 +68,14 @@ COMMANDS = {
     ),
     "recover": ("gritd.tools.commands.recover", "salvage an unclosed or damaged recording"),
     "import": ("gritd.tools.commands.import_rig", "time series and other rigs' data to recordings"),
-    "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
+    "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers next to ours"),
     "prove": (
         "gritd.tools.commands.prove",
         "blind trials of diagnose against an independent plant",
     ),
     "bench": (
         "gritd.tools.commands.bench",
-        "what a tick, a replay, a force, an update and a message cost here, beside others",
+        "what a tick, a replay, a force, an update and a message cost here, compared with others",
     ),
     "completion": ("gritd.tools.commands.completion", "the shell completes commands and options"),
 }

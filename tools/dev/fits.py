@@ -250,7 +250,7 @@ def page(outcomes: Sequence[FitOutcome], asked: int) -> str:
         "",
         f"- off by more than {LIMIT} nats from where the descent ended: {len(near)};",
         f"- off by more than {LIMIT} nats from there or from a point about it: {len(off)};",
-        f"- did not converge, and are told so: {sum(not r.converged for r in rows)};",
+        f"- did not converge, and are reported so: {sum(not r.converged for r in rows)};",
         f"- campaigns that could not be diagnosed: {len(outcomes) - len(done)}.",
     ]
 

@@ -1,4 +1,4 @@
-"""The report of a campaign without a diagnosis: what was driven, forces beside the equations, the
+"""The report of a campaign without a diagnosis: what was driven, forces against the equations, the
 estimates with their bands, and the state of the sensors.
 """
 
@@ -37,7 +37,7 @@ LATE = 5.0  # usual distances of two messages: what is farther is a gap
 
 @dataclass(frozen=True)
 class ReportedCampaign:
-    """What is told of a campaign."""
+    """What is reported of a campaign."""
 
     testbed: str
     runs: Sequence[LabRun]
@@ -119,7 +119,7 @@ def _forces(campaign: ReportedCampaign) -> Markup | None:
         return None
     note = (
         "Both forms at the measured entry angle, slip and load, with the soil that the runs "
-        f"together know and {_effects(of)}. Beside each load stand the root mean square "
+        f"together know and {_effects(of)}. Next to each load stand the root mean square "
         "differences from what was measured."
     )
     return section("Drawbar pull and torque against slip", tag("p", note), _drawn_forces(of))
@@ -146,7 +146,7 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
 
         if drawn:
             name = label.split(" ")[0]
-            caption = f"{name} against slip, original and closed form beside what was recorded."
+            caption = f"{name} against slip, original and closed form against what was recorded."
             legend = figures.legend(KEY)
             yield figures.figure(caption, *_in_view(drawn), legend=legend, whole=True)
 

@@ -282,7 +282,7 @@ def _again(diagnosis: Diagnosis, name: str) -> list[Markup] | None:
         return None
     command = shlex.join(["gritd", "diagnose", "--redo", name])
     note = (
-        "This page holds what it takes beside the recordings: they are checked by their hashes, "
+        "This page holds what it takes besides the recordings: they are checked by their hashes, "
         "and results compared."
     )
     embedded = tag("pre", record.as_json(diagnosis), id=record.EMBEDDED, hidden="hidden")

@@ -26,8 +26,8 @@ def notes(of: Sequence[Hypothesis]) -> Markup | None:
     known = [h.effect for h in of if h.effect in EFFECTS]
     if not known:
         return None
-    told = tag("div", map(_note, known), class_="effect-notes")
-    return section("The effects named here", told)
+    notes = tag("div", map(_note, known), class_="effect-notes")
+    return section("The effects named here", notes)
 
 
 def _note(name: str) -> Markup:

@@ -114,7 +114,7 @@ def _learned(axes: Array, ticks: Rows, seconds: Array, truth: Mapping[str, float
 
 
 def _closing(field: str, ticks: Rows, truth: Mapping[str, float]) -> str:
-    """The last estimate in words, beside the truth."""
+    """The last estimate in words, compared with the truth."""
     value, sigma = float(ticks[field][-1]), float(ticks[f"{field}_sigma"][-1])
     factor = dict((name, factor) for name, _, factor in SOUGHT)[field]
     digits = {"cohesion": 0, "tan_phi": 4, "shear_modulus": 2}[field]

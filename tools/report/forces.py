@@ -1,5 +1,5 @@
-"""Forces of a campaign against slip at each load, beside both forms of the equations: Figs. 7 and 8
-of the paper, at the width of a column.
+"""Forces of a campaign against slip at each load, against both forms of the equations: Figs. 7 and
+8 of the paper, at the width of a column.
 """
 
 from __future__ import annotations

@@ -88,8 +88,8 @@ def _or_alike(group: Sequence[Hypothesis]) -> str:
 
 
 def _equals(of: Sequence[Sequence[Hypothesis]]) -> Markup | None:
-    """What is accepted, a line each, with all that it cannot be told from; None where nothing is
-    alike.
+    """What is accepted, a line each, with all that it cannot be distinguished from; None where
+    nothing is alike.
     """
     if not any(len(group) > 1 for group in of):
         return None
@@ -98,7 +98,7 @@ def _equals(of: Sequence[Sequence[Hypothesis]]) -> Markup | None:
 
 def _line(group: Sequence[Hypothesis]) -> str:
     names = either([f"{name_of(h.effect)} ({percent(h.probability)})" for h in group])
-    return held(names) + ": not told apart by these recordings" * (len(group) > 1)
+    return held(names) + ": not distinguished by these recordings" * (len(group) > 1)
 
 
 def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
@@ -110,7 +110,7 @@ def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
 
 
 def _accepted(diagnosis: Diagnosis, h: Hypothesis) -> tuple[str, str, str]:
-    """An effect, or a group that is not told apart, with its probability, and how strong it is."""
+    """An effect or an undistinguished group, with its probability and its strength."""
     parameters = "; ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items())
     group = simplest_first(diagnosis, h)
     if len(group) == 1:
@@ -129,7 +129,7 @@ def _figure(term: str, value: str, detail: str) -> Markup:
 
 
 def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
-    """The few numbers a hurried reader takes away: what, how much, beside what."""
+    """The few numbers a hurried reader takes away: what, how much, compared with what."""
     channel = _most_improved(diagnosis)
     if channel:
         fell, floor = change(diagnosis, channel)

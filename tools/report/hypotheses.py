@@ -64,8 +64,8 @@ def _rank(h: Hypothesis, place: int) -> tuple[bool, float, int, int]:
 
 
 def in_order(group: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Of effects that are not told apart, those that are as probable as the likeliest first, and of
-    these the one with the fewest parameters; the others by their probability.
+    """Of effects that are not distinguished, those that are as probable as the likeliest first, and
+    of these the one with the fewest parameters; the others by their probability.
     """
     least = EQUAL * max(h.probability for h in group)
 
@@ -91,7 +91,7 @@ def _group(group: Sequence[Hypothesis]) -> Markup:
         return tag("div", _bar(group[0]), class_="group")
 
     total = min(sum(h.probability for h in group), 1.0)
-    note = f"Not told apart by these recordings; together {percent(total)}."
+    note = f"Not distinguished by these recordings; together {percent(total)}."
     bars = (_bar(h) for h in group)
 
     return tag(

@@ -1,4 +1,4 @@
-"""Runs as a lab book has them: what was driven, and what the equations say beside it."""
+"""Runs as a lab book has them: what was driven, and what the equations say of it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CHANNELS = ("torque", "drawbar_pull")
 
 @dataclass(frozen=True)
 class MeasuredWindows:
-    """Measured beside the equations at the windows (n,) at which the filter was updated."""
+    """Measured against the equations at the windows (n,) at which the filter was updated."""
 
     slip: Array
     load: Array  # [N]
@@ -263,5 +263,5 @@ def with_runs(
     given = ((settings_of_run(without_absent(settings, r), r.run), r) for r in recordings)
     runs = lab_runs(list(bed_runs(given, settings.bed.repeatability)))
 
-    told = {front.RIG: settings.testbed, front.RUNS: records_of(runs)}
-    return replace(diagnosis, redo={**diagnosis.redo, **told})
+    added = {front.RIG: settings.testbed, front.RUNS: records_of(runs)}
+    return replace(diagnosis, redo={**diagnosis.redo, **added})

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.rig.signals import sha256
 from gritd.tools.diagnose.rig.wheel import Bed
 
-WELL = 0.9  # share of the new campaign that must be covered for nothing to be told of it
+WELL = 0.9  # share of the new campaign that must be covered for nothing to be reported of it
 
 
 @dataclass(frozen=True)

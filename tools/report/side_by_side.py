@@ -1,4 +1,4 @@
-"""Reference and new campaign beside each other: what the model leaves of both with nothing new."""
+"""Reference and new campaign side by side: what the model leaves of both with nothing new."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def _parsed(line: bytes) -> Report:
     return report
 
 
-def told(form: Callable[[Report], Iterator[str]], report: Report) -> list[str]:
+def in_lines(form: Callable[[Report], Iterator[str]], report: Report) -> list[str]:
     """A report in lines, whoever sent it. Raises CommandError where a field is missing."""
     try:
         return [visible(line) for line in form(report)]

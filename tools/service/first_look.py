@@ -1,6 +1,6 @@
 """Whether the first seconds in which the wheel drives can be: once, with a line for what cannot.
 
-What is told changes neither the estimate nor the recording's ticks.
+What is reported changes neither the estimate nor the recording's ticks.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ class Recurring:
 
     def __init__(self, what: str, total: int = 0) -> None:
         self._what, self._total = what, total
-        self._count = self._told = 0  # since it began, and how many of them were said
+        self._count = self._reported = 0  # since it began, and how many of them were said
         self._began = self._moved = 0.0
         self._said = -PAUSE
 
@@ -29,22 +29,22 @@ class Recurring:
         if new > 0:
             self._began = self._began if self._count else now
             self._count, self._moved = self._count + new, now
-        if self._count > self._told and now - self._said >= PAUSE:
+        if self._count > self._reported and now - self._said >= PAUSE:
             return self._go_on(now)
-        if self._told and now - self._moved >= OVER:
+        if self._reported and now - self._moved >= OVER:
             return self._end()
         return None
 
     def _go_on(self, now: float) -> Notice:
-        in_all = f", {self._count} in all" * (self._told > 0)
-        text = f"{self._what}: {self._count - self._told}{in_all}"
-        self._told, self._said = self._count, now
+        in_all = f", {self._count} in all" * (self._reported > 0)
+        text = f"{self._what}: {self._count - self._reported}{in_all}"
+        self._reported, self._said = self._count, now
         return Notice(text)
 
     def _end(self) -> Notice | None:
         """What was said in full needs no second line."""
-        count, told, self._count, self._told = self._count, self._told, 0, 0
-        if count == told:
+        count, reported, self._count, self._reported = self._count, self._reported, 0, 0
+        if count == reported:
             return None
         lasted = self._moved - self._began
         return Notice(f"{self._what}: over after {lasted:.1f} s, {count} in all", over=True)

@@ -1,4 +1,4 @@
-"""What people are told of the running daemon, in its journal and in the recording's /log: every
+"""What people read of the running daemon, in its journal and in the recording's /log: every
 change of what works and what does not, with how often and how long.
 """
 

@@ -47,7 +47,7 @@ class QueueSource:
 
 @dataclass(frozen=True)
 class Service:
-    """What `gritd run` is told beside the configuration."""
+    """What `gritd run` is given besides the configuration."""
 
     lock: FolderLock  # of the logs
     run: RunInfo

@@ -1,4 +1,4 @@
-"""`gritd view` beside a daemon, as a process of its own that ends with it."""
+"""`gritd view` next to a daemon, as a process of its own that ends with it."""
 
 from __future__ import annotations
 

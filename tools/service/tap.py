@@ -36,7 +36,7 @@ class Taps:
     """
 
     def __init__(self, folder: Path, settings: Settings) -> None:
-        self._told: set[Path] = set()
+        self._reported: set[Path] = set()
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -49,9 +49,9 @@ class Taps:
         }
 
     def trouble(self) -> list[str]:
-        """What is to be told since the last call, one line each: logs that were given up."""
-        failed = [w for w in self.writers.values() if w.error and w.path not in self._told]
-        self._told |= {writer.path for writer in failed}
+        """What is to be reported since the last call, one line each: logs that were given up."""
+        failed = [w for w in self.writers.values() if w.error and w.path not in self._reported]
+        self._reported |= {writer.path for writer in failed}
         return [f"{writer.path}: {writer.error}; nothing more is kept of it" for writer in failed]
 
     def close(self) -> str:

@@ -1,4 +1,4 @@
-"""What `gritd run` does beside its threads, ten times a second: tell people and the service
+"""What `gritd run` does besides its threads, ten times a second: tell people and the service
 manager, reload, tidy.
 """
 

@@ -19,7 +19,7 @@ from gritd.tools.testbed.sensors import readings
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """A simulated run: what the controller was told, what happened, and what the sensors sent."""
+    """A simulated run: what was commanded, what happened, and what the sensors sent."""
 
     motion: Motion
     response: Response

@@ -113,8 +113,8 @@ def recorded(
     async def moment(request: Request) -> Response:
         if (asked := Asked.of(request, len(recordings.runs))) is None:
             return _senseless()
-        told = await asyncio.to_thread(recordings.moment, asked.run, asked.along, asked.at)
-        return Response(line_of(told), media_type="application/json")
+        found = await asyncio.to_thread(recordings.moment, asked.run, asked.along, asked.at)
+        return Response(line_of(found), media_type="application/json")
 
     async def difference(request: Request) -> Response:
         asked = Asked.of(request, len(recordings.runs))
@@ -127,7 +127,7 @@ def recorded(
         return JSONResponse(found)
 
     async def forces(request: Request) -> Response:
-        return Response(line_of(campaign.told), media_type="application/json")
+        return Response(line_of(campaign.answer), media_type="application/json")
 
     answers = {"/about": about, "/events": events, "/stretch": stretch, "/moment": moment}
     answers |= {"/campaign": forces, "/diff": difference}

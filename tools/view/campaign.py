@@ -24,7 +24,7 @@ class ViewedCampaign:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths
-        self.told: dict[str, Any] = {"state": "computing"}
+        self.answer: dict[str, Any] = {"state": "computing"}
         self._thread = Thread(target=self._run, name="campaign", daemon=True)
 
     def start(self) -> None:
@@ -42,7 +42,7 @@ class ViewedCampaign:
                 preexec_fn=ends_with_us(),
             )
             if out.is_file():
-                self.told = {"state": "done", **json.loads(out.read_text(encoding="utf-8"))}
+                self.answer = {"state": "done", **json.loads(out.read_text(encoding="utf-8"))}
             else:
                 last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-                self.told = {"state": "failed", "reason": visible(last)[:300]}
+                self.answer = {"state": "failed", "reason": visible(last)[:300]}

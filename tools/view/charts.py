@@ -34,7 +34,7 @@ class Chart:
     factor: float
     decimals: int
     curves: tuple[Curve, ...]
-    prior: str = ""  # key of the stated prior that is drawn beside it
+    prior: str = ""  # key of the stated prior that is drawn with it
     expected: float | None = None  # where σ is honest
 
 
@@ -44,7 +44,7 @@ def _estimate(title: str, symbol: str, field: str, unit: str, factor: float, dig
 
 
 def _beside(title: str, symbol: str, field: str, unit: str, digits: int) -> Chart:
-    """Measured beside predicted."""
+    """Measured against predicted."""
     curves = (
         Curve(field, "measured", "measured"),
         Curve(f"{field}_predicted", "predicted", "predicted", f"{field}_predicted_sigma"),
@@ -113,7 +113,7 @@ def fields_of(charts: Iterable[Chart]) -> tuple[str, ...]:
 
 
 def layout(charts: Sequence[Chart]) -> list[dict[str, Any]]:
-    """What the page is told; its columns are those of `drawn`, in order."""
+    """What the page is given; its columns are those of `drawn`, in order."""
     return [asdict(chart) for chart in charts]
 
 

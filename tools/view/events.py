@@ -46,7 +46,7 @@ class Events:
         self.count += 1
 
     def _parts(self, before: Report, now: Report) -> Iterator[tuple[str, str]]:
-        """Channels and devices that are lost; and back, where their loss was told."""
+        """Channels and devices that are lost; and back, where their loss was reported."""
         for name, (was, is_now) in _states(before, now).items():
             good = is_now in ("ok", "OPEN")
             if was == is_now or (good and name not in self._lost):

@@ -30,7 +30,7 @@ STARTED_BEFORE = 1.0  # [s] time that goes back by more is another daemon's cloc
 LIVE = (*CHARTS, LATENESS)
 PATH = 300  # points of the way of (c, tan φ)
 
-Told = Callable[[bytes], None]
+Receiver = Callable[[bytes], None]
 Taken = Callable[[Report], None]
 
 
@@ -39,7 +39,7 @@ class DaemonFeed:
 
     def __init__(self, socket: str | None) -> None:
         self._socket = socket
-        self._told: Told = _nobody
+        self._receive: Receiver = _nobody
         self._taken: Taken = _nobody
         self._history = History(fields_of(LIVE))
         self._events = Events()
@@ -49,9 +49,9 @@ class DaemonFeed:
         self._trouble = ""
         self._thread = Thread(target=self._run, name="feed", daemon=True)
 
-    def start(self, told: Told, taken: Taken | None = None) -> None:
-        """`told` gets a frame as JSON for every report, `taken` the report; from the thread."""
-        self._told, self._taken = told, taken or _nobody
+    def start(self, receive: Receiver, taken: Taken | None = None) -> None:
+        """`receive` gets a frame as JSON for every report, `taken` the report; from the thread."""
+        self._receive, self._taken = receive, taken or _nobody
         self._thread.start()
 
     def close(self) -> None:
@@ -109,13 +109,13 @@ class DaemonFeed:
         """Raises CommandError where the report is not the daemon's."""
         try:
             with self._lock:
-                told = self._told_of(report)
+                frame = self._frame_of(report)
             self._taken(report)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
             raise CommandError(NO_GRITD) from None
-        self._told(told)
+        self._receive(frame)
 
-    def _told_of(self, report: Report) -> bytes:
+    def _frame_of(self, report: Report) -> bytes:
         now = _time(report)
         if self._history.last - now > STARTED_BEFORE:
             self._history.begin_anew()
@@ -126,7 +126,7 @@ class DaemonFeed:
 
         setup = json.dumps(report.get("setup"))
         if setup != self._setup_of:
-            self._setup, self._setup_of = Setup.told(report), setup
+            self._setup, self._setup_of = Setup.of_report(report), setup
 
         values = {**report["tick"], "lateness": report["loop"].get("lateness")}
         row = self._row(now, values) if self._history.add(now, values) else None
@@ -152,7 +152,7 @@ class DaemonFeed:
             marks = self._events.count
 
         words = {"tone": BAD, "title": "No daemon", "reason": visible(why), "notes": []}
-        self._told(_encoded({"time": None, "row": None, "marks": marks, "headline": words}))
+        self._receive(_encoded({"time": None, "row": None, "marks": marks, "headline": words}))
 
 
 def _nobody(what: object) -> None:

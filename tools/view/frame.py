@@ -41,8 +41,8 @@ class Setup:
     testbed: str = ""
 
     @classmethod
-    def told(cls, report: Report) -> Setup:
-        """By a daemon; an older one tells nothing."""
+    def of_report(cls, report: Report) -> Setup:
+        """Of a daemon; an older one tells nothing."""
         setup = report.get("setup")
         if not setup:
             return cls()
@@ -128,8 +128,8 @@ def _ellipse(tick: Mapping[str, Any]) -> dict[str, float] | None:
 
 def _about(report: Report, setup: Setup) -> str:
     """Testbed and run in a line."""
-    told = (setup.testbed, setup.run and f"run {setup.run}", f"up {age(report['uptime'])}")
-    return " · ".join(filter(None, told))
+    heads = (setup.testbed, setup.run and f"run {setup.run}", f"up {age(report['uptime'])}")
+    return " · ".join(filter(None, heads))
 
 
 def _channels(report: Report) -> Iterable[dict[str, Any]]:

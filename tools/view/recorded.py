@@ -118,7 +118,7 @@ class Recordings:
         row = chosen.curves.nearest(along, at)
         tick = chosen.curves.tick(row)
         status, flags = Status(tick["status"]), tick["flags"]
-        told = {
+        fields = {
             "status": status.name,
             "flags": [flag.name for flag in Flag if flag and flags & flag],
             "channels": {name: _condition(tick, bit) for name, bit in CHANNEL_BITS.items()},
@@ -127,12 +127,12 @@ class Recordings:
             "log": {"state": "writing"},
         }
 
-        words = headline(told)
+        words = headline(fields)
         return {
             **moment(tick, chosen.setup),
             "headline": words._asdict(),
             "status": status.name,
-            "flags": told["flags"],
+            "flags": fields["flags"],
             "sequence": tick["sequence"],
             "time": float(chosen.curves.time[row]),
             "way": float(chosen.curves.way[row]),
@@ -152,8 +152,8 @@ class Recordings:
 def _end(curves: RunCurves) -> dict[str, str]:
     """Status and estimate at the end, in words."""
     tick = curves.tick(len(curves.time) - 1)
-    told = {v["label"]: f"{v['value']} ± {v['sigma']}" for v in moment(tick, Setup())["values"]}
-    return {"status": Status(tick["status"]).name, "c": told["c"], "tan_phi": told["tan φ"]}
+    texts = {v["label"]: f"{v['value']} ± {v['sigma']}" for v in moment(tick, Setup())["values"]}
+    return {"status": Status(tick["status"]).name, "c": texts["c"], "tan_phi": texts["tan φ"]}
 
 
 def _condition(tick: dict[str, Any], bit: int) -> str:
@@ -194,4 +194,4 @@ def _setup(recording: Recording, name: str) -> Setup:
         settings = loads(recording.config_yaml or "", str(recording.path)).settings
     except ConfigError:
         return Setup(run=name)
-    return Setup.told({"setup": setup(settings, name)})
+    return Setup.of_report({"setup": setup(settings, name)})

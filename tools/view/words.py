@@ -96,7 +96,7 @@ def _of_the_estimate(flags: list[str]) -> Iterator[str]:
     if "PRIOR" in flags:
         yield "c, tan φ and k are the stated prior: the filter's own estimate is not believed."
     elif "NOT_SEPARABLE" in flags:
-        yield "c and tan φ cannot be told apart yet, only their sum of effects: drive another load."
+        yield "c and tan φ cannot be distinguished yet, only their joint effect: vary the load."
     if "CHANGED" in flags:
         yield "The soil changed in the last seconds: σ was widened, c and tan φ move."
     if "LOAD_ASSUMED" in flags:

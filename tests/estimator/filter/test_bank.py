@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.filter import form_error
-from gritd.estimator.filter.bank import leading, misfit, told, weights
+from gritd.estimator.filter.bank import leading, misfit, reported, weights
 from gritd.estimator.filter.estimate import made
 from gritd.estimator.filter.tuning import FORM
 from gritd.estimator.messages.status import Flag
@@ -34,7 +34,7 @@ def test_without_evidence_all_sizes_are_as_probable_as_before_the_run():
 def test_evidence_for_exact_equations_narrows_and_against_them_widens():
     exact, sensors = bank(50.0, 0.0, 0.0, 0.0), bank(0.0, 50.0, 0.0, 0.0)
     nothing, wrong = bank(0.0, 0.0, 0.0, 0.0), bank(0.0, 0.0, 50.0, 0.0)
-    widths = [told(each).soil_P[0][0] for each in (exact, sensors, nothing, wrong)]
+    widths = [reported(each).soil_P[0][0] for each in (exact, sensors, nothing, wrong)]
     assert widths == sorted(widths)
     assert widths[0] == pytest.approx(0.1) and widths[3] == pytest.approx(0.8)
     assert misfit(exact) < 1e-9 and misfit(sensors) < 1e-9 and misfit(wrong) > 1.0 - 1e-9

@@ -13,7 +13,7 @@ from gritd.config import packaged
 from gritd.estimator.config.configuration import load
 from gritd.estimator.plausibility.driven import Raw, driven
 from gritd.estimator.plausibility.mistakes import OF_A_RECORDING
-from gritd.estimator.plausibility.words import told
+from gritd.estimator.plausibility.words import sentences
 
 TESTBED = load(packaged()).settings
 MOST = 4_000_000_000_000_000_000
@@ -45,6 +45,6 @@ def test_any_readings_make_lines(data: st.DataObject) -> None:
     configured = replace(TESTBED, rates=replace(TESTBED.rates, auto=auto))
 
     run = driven("run", raw, configured, data.draw(st.none() | st.floats(1.0, 1e6)))
-    lines = list(told([(run, configured)], OF_A_RECORDING))
+    lines = list(sentences([(run, configured)], OF_A_RECORDING))
     assert len(lines) >= 3 and all(line.count("\n") == 0 for line in lines)
     assert all(len(line) <= 300 for line in lines[3:])

@@ -107,7 +107,7 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
             "explained",
             (
                 "Explained: Coulomb friction or similar",
-                "Coulomb friction (86 %) or current offset (12 %): not told apart",
+                "Coulomb friction (86 %) or current offset (12 %): not distinguished",
                 "98 % probable",
                 "213 nats",
                 "0.11 → 0.013 N·m",
@@ -161,7 +161,7 @@ def test_explained_says_everything_it_was_given() -> None:
         "0.0630 mm",  # sinkage in millimetres
         "4.2 → 1.1",  # innovations
         "Torque rises late in the runs. 12.4 s",  # where it starts
-        "Not told apart by these recordings; together 98 %",
+        "Not distinguished by these recordings; together 98 %",
         "Stand still for some seconds with the drive powered. "
         "It would tell Coulomb friction and current offset apart",
         "2 other effects tried, each below 1 %",

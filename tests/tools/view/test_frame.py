@@ -44,7 +44,7 @@ def test_what_must_be_known_beside_the_status_is_a_note(flag: str) -> None:
 
 
 def test_values_are_those_of_the_tick_in_their_units() -> None:
-    shown = frame(report(), Setup.told(report()))
+    shown = frame(report(), Setup.of_report(report()))
     values = {v["label"]: (v["value"], v["sigma"], v["unit"]) for v in shown["values"]}
     assert values["c"] == ("812", "35", "Pa")
     assert values["tan φ"] == ("0.5771", "0.0123", "")
@@ -57,7 +57,7 @@ def test_without_a_tick_and_from_an_older_daemon_there_is_a_frame() -> None:
     old = {**report(status="STARTING"), "tick": {}, "loop": {"ticks": 0}, "channels": {}}
     for key in ("setup", "sensors", "wall_clock"):
         del old[key]
-    shown = frame(old, Setup.told(old))
+    shown = frame(old, Setup.of_report(old))
     assert shown["values"] == [] and shown["ellipse"] is None and shown["rim"] is None
 
 

@@ -122,22 +122,22 @@ def test_what_two_runs_were_made_with_is_compared(recordings: Recordings) -> Non
 
 def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path]) -> None:
     campaign = ViewedCampaign(paths)
-    assert campaign.told == {"state": "computing"}
+    assert campaign.answer == {"state": "computing"}
     campaign._run()
-    assert campaign.told["state"] == "done" and len(campaign.told["runs"]) == 2
-    for run in campaign.told["runs"]:
+    assert campaign.answer["state"] == "done" and len(campaign.told["runs"]) == 2
+    for run in campaign.answer["runs"]:
         assert [round(part["load"], -1) for part in run["loads"]] == [40.0, 80.0]
         for part in run["loads"]:
             measured, original = part["torque"]["measured"], part["torque"]["original"]["value"]
             assert len(measured) == len(part["slip"])
             assert np.mean(original) == pytest.approx(np.mean(measured), rel=0.05)
-    json.dumps(campaign.told, allow_nan=False)
+    json.dumps(campaign.answer, allow_nan=False)
 
 
 def test_a_campaign_that_cannot_be_computed_says_why(tmp_path: Path) -> None:
     campaign = ViewedCampaign([tmp_path / "none.mcap"])
     campaign._run()
-    assert campaign.told["state"] == "failed" and "none.mcap" in campaign.told["reason"]
+    assert campaign.answer["state"] == "failed" and "none.mcap" in campaign.told["reason"]
 
 
 @pytest.mark.slow

@@ -26,9 +26,9 @@ DIAMETER = re.compile(r"plate\s*diameter\s*:?\s*([\d.]+)\s*(mm|cm|m)\b", re.IGNO
 PAIR = re.compile(r"\s*(-?\d+\.?\d*)\s*[,;\t]\s*(-?\d+\.?\d*)\s*$")
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHALLOW = 2e-3  # [m] a plate has not met the soil with all of its face before
-BEFORE = 5e-3  # [m] that a plate may have sunk in before its force is told from none
+BEFORE = 5e-3  # [m] that a plate may have sunk in before its force is distinguished from zero
 FEWEST = 8  # points of a test
-SURE = 2.0  # [σ] from which k_c is told from 0
+SURE = 2.0  # [σ] from which k_c is distinguished from 0
 UNLIKE = 1.5  # the largest plate over the smallest, from which they may tell k_c: a wheel is wider
 NO_PRESS = (
     "found no press; expected the load to rise from below {:g} N, the plate in the air, to its "
@@ -90,7 +90,7 @@ def of_press(name: str, radius: float, force: Array, depth: Array, contact: floa
     `contact` [N]; where the force never was below, as it is written. Raises CommandError.
     """
     far = spikes.spikes(force) | spikes.spikes(depth)
-    spikes.told(far, "plate", f"{name}: ")
+    spikes.note(far, "plate", f"{name}: ")
     force, depth = force[~far], depth[~far]
 
     hanging = np.flatnonzero(force < contact)
@@ -175,7 +175,7 @@ def _moduli(radius: Array, moduli: Array, width: float) -> tuple[float, float, f
     alone = scatter * float(np.sqrt(1.0 + 1.0 / moduli.size))
     sizes = np.unique(radius.round(5))
     if sizes[-1] < UNLIKE * sizes[0]:
-        return 0.0, mean, alone, [_untold(sizes, "are too alike to tell k_c")]
+        return 0.0, mean, alone, [_undetermined(sizes, "are too alike to tell k_c")]
 
     design = np.column_stack([1.0 / radius, np.ones_like(radius)])
     coefficients, *_ = np.linalg.lstsq(design, moduli, rcond=None)
@@ -184,11 +184,11 @@ def _moduli(radius: Array, moduli: Array, width: float) -> tuple[float, float, f
     covariance = variance * np.linalg.inv(design.T @ design)
     at = np.array([1.0 / width, 1.0])
 
-    told = (
+    distinct = (
         abs(coefficients[0]) > SURE * float(np.sqrt(covariance[0, 0])) and at @ coefficients > 0.0
     )
-    if not told:
-        return 0.0, mean, alone, [_untold(sizes, "do not tell k_c from 0")]
+    if not distinct:
+        return 0.0, mean, alone, [_undetermined(sizes, "do not tell k_c from 0")]
     spread = float(np.sqrt(variance + at @ covariance @ at))
     return float(coefficients[0]), float(coefficients[1]), spread, []
 
@@ -198,7 +198,7 @@ def _rounded(value: float, digits: int) -> Uncertain:
     return Uncertain(float(f"{value:.{digits}g}"))
 
 
-def _untold(sizes: Array, why: str) -> str:
+def _undetermined(sizes: Array, why: str) -> str:
     diameters = ", ".join(f"{2e3 * size:g}" for size in sizes.tolist())
     return f"plates of {diameters} mm {why}; it is written as 0"
 

@@ -1,4 +1,4 @@
-"""The drive: known torques on a lever, the wheel spun in the air, or a torque sensor beside the
+"""The drive: known torques on a lever, the wheel spun in the air, or a torque sensor next to the
 motor's current.
 """
 
@@ -128,7 +128,7 @@ def _weighted(design: Array, values: Array, sigma: Array) -> tuple[Array, Array,
 
 
 def _spins(recorded: Recording, settings: Settings) -> tuple[list[Spin], list[str]]:
-    """Stretches of steady speed, without those at rest, and what is to be told of the current.
+    """Stretches of steady speed, without those at rest, and what is to be reported of the current.
     Raises CommandError where it creeps.
     """
     time, speed = _speed(recorded, settings)

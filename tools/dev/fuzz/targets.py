@@ -20,7 +20,7 @@ from gritd.tools.dev.fuzz.files import configurations, recordings, truncations
 from gritd.tools.dev.fuzz.readings import wild_inputs
 from gritd.tools.dev.fuzz.wire import can_messages, databases, serial_stream
 
-SHOWN = 5  # failures told in full
+SHOWN = 5  # failures reported in full
 
 
 @dataclass(frozen=True)

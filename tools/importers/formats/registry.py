@@ -56,9 +56,9 @@ def format_of(path: Path) -> Format | None:
     except OSError as error:
         raise RigFileError(f"{path}: cannot be read: {error.strerror or error}") from None
 
-    told = [each for each in FORMATS if begins.startswith(each.marks)]
+    marked = [each for each in FORMATS if begins.startswith(each.marks)]
     named = [each for each in FORMATS if path.name.lower().endswith(each.endings)]
-    return next(iter(told or reversed(named)), None)
+    return next(iter(marked or reversed(named)), None)
 
 
 def read(path: Path, wanted: Wanted) -> list[SeriesTable] | None:

@@ -81,8 +81,8 @@ def read_mcap(path: Path, wanted: Wanted) -> list[SeriesTable]:
     asked = {topic for topic in decoders if _asks(wanted, topic)}
     total = sum(recording.counts[topic] for topic in asked)
     tables = _tables(path, _of_mcap(recording, asked), decoders, wanted, total)
-    told = [f"{path.name}: {line}" for line in (*recording.damage, *recording.notes)]
-    return _noted(tables, [f"{topic}: {why}" for topic, why in refused.items()], told)
+    lines = [f"{path.name}: {line}" for line in (*recording.damage, *recording.notes)]
+    return _noted(tables, [f"{topic}: {why}" for topic, why in refused.items()], lines)
 
 
 def _of_mcap(recording: Recording, asked: set[str]) -> Iterator[_Message]:
@@ -236,8 +236,8 @@ def _table(path: Path, name: str, topic: _Topic) -> SeriesTable:
         for path, numbers in zip(topic.getters, arrays, strict=True)
         if path in topic.found or not np.all(np.isnan(numbers))
     }
-    told = tuple(f"{name}: {note}" for note in notes)
-    return SeriesTable(path, columns, group=name, clock=clock, notes=told)
+    lines = tuple(f"{name}: {note}" for note in notes)
+    return SeriesTable(path, columns, group=name, clock=clock, notes=lines)
 
 
 def _clock(topic: _Topic) -> tuple[Nanoseconds | None, list[str]]:

@@ -60,11 +60,11 @@ def _table(path: Path, sheet: str, rows: Rows, wanted: Wanted) -> Iterator[Serie
             )
         columns[full] = _column(cells)
 
-    told = {f"{sheet}.{name}": unit for name, unit in (units or {}).items()}
+    by_column = {f"{sheet}.{name}": unit for name, unit in (units or {}).items()}
     first = at + 2 + (units is not None)
     if columns:
         lines = np.arange(first, first + len(body))
-        yield SeriesTable(path, columns, told or None, lines, group=sheet)
+        yield SeriesTable(path, columns, by_column or None, lines, group=sheet)
 
 
 def _header(rows: Rows) -> int | None:

@@ -226,12 +226,12 @@ def _radius(path: Path, rim_speed: Array) -> float:
     if values.size < 3:
         return RADIUS  # too few to tell a step
 
-    told = RADIUS * float(np.min(np.diff(values))) / QUANTUM
-    known = [radius for radius in RADII if abs(told / radius - 1.0) < ALIKE]
+    radius_seen = RADIUS * float(np.min(np.diff(values))) / QUANTUM
+    known = [radius for radius in RADII if abs(radius_seen / radius - 1.0) < ALIKE]
     if not known:
         raise RigFileError(
             f"{path}: maxon_velmes: found steps of {1e3 * np.min(np.diff(values)):.4g} mm/s, as of "
-            f"a wheel of radius {told:.3g} m; expected one of {RADII[0]:g} or {RADII[1]:g} m"
+            f"a wheel of radius {radius_seen:.3g} m; expected one of {RADII[0]:g} or {RADII[1]:g} m"
         )
 
     return known[0]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.plausibility.words import told
+from gritd.estimator.plausibility.words import sentences
 from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import USAGE
 from gritd.tools.cli.progress import Progress
@@ -18,7 +18,7 @@ from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import START
 from gritd.tools.importers.series import written
 from gritd.tools.importers.series.clocks import runs_of
-from gritd.tools.importers.series.columns import SeriesTable, Told, Wanted
+from gritd.tools.importers.series.columns import Advance, SeriesTable, Wanted
 from gritd.tools.importers.series.convert import AXES, converted
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
@@ -71,8 +71,8 @@ def _all(paths: Sequence[Path], left_out: list[str]) -> list[SeriesTable]:
     files = series_files(paths, left_out)
     tables: list[SeriesTable] = []
     with Progress("reading") as progress:
-        for path, told in zip(files, _shares(progress, files), strict=True):
-            tables += read(path, Wanted(rows=ENOUGH), told=told)
+        for path, advance in zip(files, _shares(progress, files), strict=True):
+            tables += read(path, Wanted(rows=ENOUGH), advance=advance)
     return tables
 
 
@@ -88,17 +88,17 @@ def _read(files: Sequence[RunFiles], mapped: SeriesMap) -> list[SeriesRun]:
     return runs
 
 
-def _shares(progress: Progress, paths: Sequence[Path]) -> Iterator[Told]:
+def _shares(progress: Progress, paths: Sequence[Path]) -> Iterator[Advance]:
     """For each file what takes the bytes of it that were read."""
     sizes = [path.stat().st_size + 1 if path.is_file() else 1 for path in paths]
     for at, path in enumerate(paths):
         before = sum(sizes[:at])
         progress.at(path.name, before / sum(sizes))
 
-        def told(done: int, name: str = path.name, before: int = before) -> None:
+        def advance(done: int, name: str = path.name, before: int = before) -> None:
             progress.at(name, (before + done) / sum(sizes))
 
-        yield told
+        yield advance
 
 
 def _import(
@@ -131,7 +131,7 @@ def _import(
     tell("every row is a reading" if behind == 1.0 else f"means over {behind:.1f} rows")
     driven = driven_of(runs, imported.streams, configured.settings)
     for line in (
-        *told(driven, sources_of(mapped)),
+        *sentences(driven, sources_of(mapped)),
         *_notes(mapped, runs, settings, given),
     ):
         tell(line)
@@ -150,7 +150,7 @@ def _configuration(text: str, given: Path | None, path: Path) -> config.Configur
     return config.load(path)
 
 
-# --- what is told ---
+# --- what is reported ---
 
 
 def _notes(

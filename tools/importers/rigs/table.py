@@ -131,7 +131,7 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
     for at, (rows, table) in enumerate(groups, start=1):
         name = stem if len(groups) == 1 else f"{stem}-{at}"
         written += _import_group(path, name, rows, table, soils, args)
-        tell(_told(name, table, errors(table, args)))
+        tell(_in_two_lines(name, table, errors(table, args)))
     return written
 
 
@@ -144,7 +144,7 @@ def _groups(table: Table) -> Iterator[tuple[list[int], Table]]:
         yield [at + 2 for at in chosen], rows
 
 
-def _told(name: str, table: Table, sigma: Mapping[str, float]) -> str:
+def _in_two_lines(name: str, table: Table, sigma: Mapping[str, float]) -> str:
     """A group, and the errors its values are taken to have, in two lines."""
     loads = np.array([float(text) for text in table["vertical_load_n"]])
     without = "" if TORQUE in table else ", no torque"

@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import RigFileError
-from gritd.tools.importers.series.columns import Column, SeriesTable, Told
+from gritd.tools.importers.series.columns import Advance, Column, SeriesTable
 from gritd.tools.importers.series.mapping import MEASURED, SeriesMap
 from gritd.tools.importers.series.runs import EPOCH, SeriesRun, info_of, of_table, resampled
 from gritd.tools.importers.series.sources import RunFiles, SourcePart, parts
@@ -18,13 +18,13 @@ from gritd.tools.importers.series.times import NS, Nanoseconds
 SLOW = "motor_temperature"  # a channel that may be slow: the filter does not wait for it
 
 
-def runs_of(files: RunFiles, mapped: SeriesMap, told: Sequence[Told]) -> Iterator[SeriesRun]:
-    """The runs of a file, or of the files that belong together; `told` for each. Raises
+def runs_of(files: RunFiles, mapped: SeriesMap, advances: Sequence[Advance]) -> Iterator[SeriesRun]:
+    """The runs of a file, or of the files that belong together; `advances` for each. Raises
     RigFileError.
     """
     found = [
         part
-        for (source, path), tell in zip(files.files, told, strict=True)
+        for (source, path), tell in zip(files.files, advances, strict=True)
         for part in parts(path, source, mapped, tell)
     ]
     yield from runs_of_parts(found, mapped, files.name)

@@ -15,9 +15,9 @@ from gritd.tools.importers.series.times import Nanoseconds
 
 SHOWN = 40  # characters of a name in a message
 ROOM = 120  # of several
-Told = Callable[[int], None]  # takes the bytes of a file that were read
+Advance = Callable[[int], None]  # takes the bytes of a file that were read
 COMPARED = 2000  # names with which a mistyped one is compared
-FEW = 5  # rows that are told one by one
+FEW = 5  # rows that are reported one by one
 
 
 @dataclass(frozen=True)
@@ -152,17 +152,17 @@ def no_column(path: Path, name: str, known: Sequence[str]) -> RigFileError:
 
 def shortened(names: Sequence[str]) -> str:
     """Names with commas, as many as a line has room for."""
-    told: list[str] = []
+    named: list[str] = []
     length = 0
     for name in names:
         length += len(name) + 2
         if length > ROOM:
-            return f"{', '.join(told)} … ({len(names)} in all)"
-        told.append(name[:SHOWN])
-    return ", ".join(told)
+            return f"{', '.join(named)} … ({len(names)} in all)"
+        named.append(name[:SHOWN])
+    return ", ".join(named)
 
 
-def told_rows(numbers: Sequence[int]) -> str:
+def row_numbers(numbers: Sequence[int]) -> str:
     """Numbers of rows in words, the first few."""
     few = ", ".join(map(str, numbers[:FEW]))
     if len(numbers) > FEW and numbers[-1] - numbers[0] == len(numbers) - 1:

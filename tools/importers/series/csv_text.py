@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gritd.estimator.limits import limits, raised
 from gritd.tools.importers.files import LARGEST, RigFileError
 from gritd.tools.importers.series.cells import OddCell
-from gritd.tools.importers.series.columns import SeriesTable, Told, no_column, told_rows
+from gritd.tools.importers.series.columns import Advance, SeriesTable, no_column, row_numbers
 from gritd.tools.importers.series.dialect import Layout, is_value, joined, layout, split
 from gritd.tools.importers.series.mapping import Mapped
 from gritd.tools.importers.series.text_columns import (
@@ -41,7 +41,7 @@ def read(
     path: Path,
     columns: Mapping[str, Mapped] | None = None,
     rows: int | None = None,
-    told: Told | None = None,
+    advance: Advance | None = None,
 ) -> SeriesTable:
     """The columns that a map names; without one all columns. `rows`: so many are enough. Raises
     RigFileError.
@@ -55,8 +55,8 @@ def read(
         while lines and (most is None or table.rows < most):
             table.add(lines[:most], first, text)
             first += len(lines)
-            if told is not None:
-                told(text.position)
+            if advance is not None:
+                advance(text.position)
             lines = text.block()
         return table.whole(text.cut)
 
@@ -147,7 +147,7 @@ def _begun(lines: Sequence[str], separator: str, last: int) -> Rows:
 
 
 class _Table:
-    """Rows to columns. What cannot be read is left out, and told."""
+    """Rows to columns. What cannot be read is left out, and reported."""
 
     def __init__(self, path: Path, form: Layout, columns: dict[tuple[str, int], Builder]) -> None:
         self._path, self._form, self._columns = path, form, columns
@@ -186,7 +186,7 @@ class _Table:
 
         why = [f"{self._path.name}: ends within its packed data: {cut[:80]}"] if cut else []
         notes = [
-            f"{self._path.name}: left out {told_rows(rows)}: {reason}"
+            f"{self._path.name}: left out {row_numbers(rows)}: {reason}"
             for reason, rows in self._left_out.items()
         ]
         return SeriesTable(
@@ -364,7 +364,7 @@ class _Table:
             return RigFileError(f"{self._path}: found no rows; expected data under the header")
         reason, rows = max(self._left_out.items(), key=lambda item: len(item[1]))
         return RigFileError(
-            f"{self._path}: found {self.rows} whole rows and {gone} others; {told_rows(rows)}: "
+            f"{self._path}: found {self.rows} whole rows and {gone} others; {row_numbers(rows)}: "
             f"{reason}; expected a table whose rows are alike"
         )
 

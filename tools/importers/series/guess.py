@@ -1,6 +1,6 @@
 """A proposal for a map, from the names of the columns and from what they hold.
 
-What cannot be told from a file is asked, with the choices, in a line that is marked `# ?`: which
+What a file does not show is asked, with the choices, in a line that is marked `# ?`: which
 unit a time is in, on which side a torque was measured, a sign. What is proposed can be read.
 """
 

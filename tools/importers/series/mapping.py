@@ -261,8 +261,8 @@ OF_FILE = {
 
 
 def _run(load: float | None, start: float, **values: Any) -> RunInfo:
-    told = {name: values[name] for name in ("operator", "notes")}
-    return RunInfo("", load, values["pass"], start, **told)
+    stated = {name: values[name] for name in ("operator", "notes")}
+    return RunInfo("", load, values["pass"], start, **stated)
 
 
 def _channels() -> dict[str, Section]:

@@ -40,7 +40,7 @@ class ColumnUnit:
 class Meaning:
     """What a column may hold.
 
-    channel: of the map; "torque?" where the side is not told.
+    channel: of the map; "torque?" where the side is not stated.
     sure: how clearly the name says so; of two columns the surer is taken.
     asks: what the user has to decide, or nothing.
     """
@@ -51,7 +51,7 @@ class Meaning:
 
 
 def unit_of(table: SeriesTable, name: str) -> ColumnUnit | None:
-    """Of the row of units, in brackets, or at the end of the name; None where nothing is told."""
+    """Of the row of units, in brackets, or at the end of the name; None where nothing is stated."""
     plain = MESSAGE.sub("", name)
     rate, ending = RATE.search(plain), ENDING.search(plain)
     texts = (

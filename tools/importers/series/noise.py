@@ -18,7 +18,7 @@ SIDE_BY_SIDE = 1000  # … in pieces of so many
 
 def scatter(seconds: Array, values: Array, resolution: float) -> float:
     """Standard deviation of one reading about the line through its neighbours, and of the rounding
-    to the last digit at least; arrays (n,), NaN in a gap. 0 where neither can be told.
+    to the last digit at least; arrays (n,), NaN in a gap. 0 where neither can be determined.
 
     Noise that has been filtered before the file was written looks smaller than it is.
     """

@@ -234,9 +234,9 @@ def _option(channel: str, column: Column, known: Array, unit: ColumnUnit | None)
     text += _wraps(
         channel, known * float(units.unit(likely).factor) * (unit.factor if unit else 1.0)
     )
-    told = f"{SIDES[channel]}; " if channel in SIDES else ""
+    side = f"{SIDES[channel]}; " if channel in SIDES else ""
     how = "unit guessed from the values" if guessed else "unit of the file"
-    return Option(text, f"{told}{how}, {_range(known)}")
+    return Option(text, f"{side}{how}, {_range(known)}")
 
 
 def _wraps(channel: str, turned: Array) -> str:

@@ -14,7 +14,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.windows import Ints, group_means
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import Array, RigFileError
-from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
+from gritd.tools.importers.series.columns import Column, SeriesTable, row_numbers
 from gritd.tools.importers.series.mapping import SeriesMap
 from gritd.tools.importers.series.noise import spacing
 from gritd.tools.importers.series.sources import CLOCKS, stem
@@ -170,7 +170,7 @@ def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list
     if len(long) > 1:
         first = [table.line(int(np.argmax(rows))) for rows in long[1:]]
         notes.append(
-            f"{table.path.name}: the time begins again at {told_rows(first)}, a new run each; "
+            f"{table.path.name}: the time begins again at {row_numbers(first)}, a new run each; "
             "state rate: in the map where it is one run"
         )
     return long

@@ -17,9 +17,9 @@ from gritd.tools.importers.formats.made import common
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.columns import (
     EVERYTHING,
+    Advance,
     Column,
     SeriesTable,
-    Told,
     Wanted,
     no_column,
     shortened,
@@ -65,7 +65,7 @@ def read(
     path: Path,
     wanted: Wanted = EVERYTHING,
     columns: Mapping[str, Mapped] | None = None,
-    told: Told | None = None,
+    advance: Advance | None = None,
 ) -> list[SeriesTable]:
     """The tables of one file, by what it is; `columns` is what the map says of those of a text.
     Raises RigFileError.
@@ -73,7 +73,7 @@ def read(
     if not path.exists():
         raise RigFileError(f"{path}: found nothing there; expected a file", USAGE)
     tables = registry.read(path, wanted)
-    return [csv_text.read(path, columns, wanted.rows, told)] if tables is None else tables
+    return [csv_text.read(path, columns, wanted.rows, advance)] if tables is None else tables
 
 
 def stem(name: str) -> str:
@@ -176,10 +176,10 @@ def _complete(run: str, own: Mapping[str, Path], sources: Sequence[MapSource]) -
 
 
 def parts(
-    path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = None
+    path: Path, source: MapSource, mapped: SeriesMap, advance: Advance | None = None
 ) -> list[SourcePart]:
     """The columns that a map names of a file, those of one clock together. Raises RigFileError."""
-    tables = read(path, Wanted(frozenset(source.columns)), source.columns, told)
+    tables = read(path, Wanted(frozenset(source.columns)), source.columns, advance)
     return parts_of(path, tables, source, mapped)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config import units
 from gritd.tools.importers.files import Array, RigFileError
-from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
+from gritd.tools.importers.series.columns import Column, SeriesTable, row_numbers
 from gritd.tools.importers.series.mapping import CLOCK, Mapped, SeriesMap
 from gritd.tools.importers.series.times import (
     NONE,
@@ -81,12 +81,12 @@ def instants(table: SeriesTable, mapped: SeriesMap) -> Nanoseconds:
     """When each row was taken [ns], shape (n,), NONE where the file does not tell. Raises
     RigFileError.
     """
-    told = [
+    timed = [
         _read(table, name, mapped.columns[name])
         for name in (mapped.named("date"), mapped.named("time"))
         if name is not None
     ]
-    times = [column.instants for column in told if column.instants is not None]
+    times = [column.instants for column in timed if column.instants is not None]
     if mapped.rate is not None:
         begin = sum(int(each[each != NONE][:1].sum()) for each in times)
         return begin + np.round(_places(table) * (NS / mapped.rate)).astype(np.int64)
@@ -94,7 +94,7 @@ def instants(table: SeriesTable, mapped: SeriesMap) -> Nanoseconds:
     known = np.all([each != NONE for each in times], axis=0)
     total = np.where(known, sum(times), NONE)
     one_day = len(times) == 1 or np.all(np.diff(times[0][known]) == 0)
-    if one_day and (period := told[-1].period or _counter(total[known], mapped)):
+    if one_day and (period := timed[-1].period or _counter(total[known], mapped)):
         total[known] = unwrapped(total[known], period)
     return total
 
@@ -197,4 +197,4 @@ def left_out(table: SeriesTable, gone: NDArray[np.bool_], why: str) -> list[str]
     if not np.any(gone):
         return []
     rows = [table.line(at) for at in np.flatnonzero(gone).tolist()]
-    return [f"{table.path.name}: left out {told_rows(rows)}: {why}"]
+    return [f"{table.path.name}: left out {row_numbers(rows)}: {why}"]

@@ -73,11 +73,11 @@ def started(
         raise CommandError(f"{output}: found a batch; expected a new folder, or --resume", USAGE)
 
     secret = secrets.token_hex(32) if seed is None else f"seed {seed}"
-    told = {"cases": cases, "strata": list(chosen), "worlds": list(worlds)}
-    sealed = seal.close(output / SECRET, {"secret": secret, **told})
+    public_part = {"cases": cases, "strata": list(chosen), "worlds": list(worlds)}
+    sealed = seal.close(output / SECRET, {"secret": secret, **public_part})
     (output / "answers").chmod(0o700)
 
-    public = {**told, "seal": sealed}
+    public = {**public_part, "seal": sealed}
     (output / BATCH).write_text(json.dumps(public, indent=1), encoding="utf-8")
     return Batch(output, cases, chosen, worlds, secret, sealed)
 
@@ -114,8 +114,8 @@ def run(
     finished: Callable[[WorkerSpec], None],
     diagnosed: bool = True,
 ) -> None:
-    """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends
-    the batch.
+    """Every case that is not done: prepared, its seal published, then diagnosed if wanted. An error
+    ends the batch.
     """
     waiting = [spec for spec in specs if not spec.done]
     waiting.reverse()

@@ -152,8 +152,8 @@ def _stretch(
 
 
 def orders(run: BlindRun, radius: float, rate: float = RATE) -> Commanded:
-    """What the controllers are told, smooth between the stretches. `radius` [m] is the one that is
-    configured.
+    """What the controllers are commanded, smooth between the stretches. `radius` [m] is the one
+    that is configured.
     """
     time = np.arange(round(run.duration * rate)) / rate
     speed = _levels(run, time, [stretch.speed for stretch in run.stretches])

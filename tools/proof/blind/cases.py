@@ -81,9 +81,9 @@ class BlindCase:
             "inseparable": self.inseparable,
             "oracle_variance": self.oracle_variance,
             "concealed": [
-                _told(effect) | {"coinciding": effect.coinciding()} for effect in self.effects
+                _described(effect) | {"coinciding": effect.coinciding()} for effect in self.effects
             ],
-            "world_habits": [_told(effect) for effect in world.habits],
+            "world_habits": [_described(effect) for effect in world.habits],
             "world_bed": {"form": type(world.bed).__name__, **vars(world.bed)},
             "soil_family": self.family,
             "soil": _soil(self.trial),
@@ -97,7 +97,7 @@ class BlindCase:
         }
 
 
-def _told(effect: PlantEffect) -> dict[str, Any]:
+def _described(effect: PlantEffect) -> dict[str, Any]:
     return {"name": effect.name, "form": type(effect).__name__, **asdict(effect)}
 
 

@@ -43,7 +43,7 @@ from gritd.tools.proof.blind.whitening import (
 
 SMALL = 0.02  # of a prior sigma: step of the differences
 LIMIT = 5.0  # D at the detection limit: five sigma
-NEAR = 3.0  # two effects that differ by less than this D cannot be told apart in a campaign
+NEAR = 3.0  # two effects that differ by less than this D cannot be distinguished in a campaign
 SHAPES = 3  # draws of a rival's shape that may imitate together
 
 
@@ -194,8 +194,8 @@ class Detector:
     def _expected(self, felt: Sequence[Felt]) -> Signals:
         """What is predicted without the effects, by run."""
         world, near = self._trial.world.with_effects(), [bare.scene for bare in self._bare]
-        told = [_told(one, self._trial) for one in felt]
-        expected = [self._read(one) for one in responses([(world, m) for m in told], False, near)]
+        seen = [_seen(one, self._trial) for one in felt]
+        expected = [self._read(one) for one in responses([(world, m) for m in seen], False, near)]
         if self._trial.wrench:
             weights = [bare.load for bare in self._bare]  # not the load that was read
             expected = [
@@ -263,7 +263,7 @@ class Detector:
         ]
 
 
-def _told(felt: Felt, trial: BlindTrial) -> TrueMotion:
+def _seen(felt: Felt, trial: BlindTrial) -> TrueMotion:
     """The motion and load that an engineer sees: the encoders' and the force sensor's."""
     motion = felt.scene.motion
     changed: dict[str, Any] = {}

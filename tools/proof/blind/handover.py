@@ -60,7 +60,7 @@ def _driven(case: BlindCase, trial: BlindTrial, folder: str, later: int) -> Driv
 
 
 def _orders(case: BlindCase, run: campaign.BlindRun) -> Commanded:
-    """What is told to the controllers, under the weights as they truly are."""
+    """What the controllers are commanded, under the weights as they truly are."""
     orders = campaign.orders(run, case.trial.known.radius)
     share = 1.0 + _weight_error(case, run.weight)
     return campaign.with_weight(orders, orders.weight * share)
@@ -134,7 +134,7 @@ def truth(one: DrivenCampaign, number: int) -> dict[str, Array]:
 
     current = shown("motor_shunt", felt.current)
     time = felt.scene.motion.time
-    told = {
+    stated = {
         "time": time[::every] - time[0],
         "sinkage": shown("sinkage_pot", felt.sinkage),
         "current": current,
@@ -142,11 +142,11 @@ def truth(one: DrivenCampaign, number: int) -> dict[str, Array]:
     }
     if chain.wrench is not None:
         wrench = (("drawbar_pull", felt.pull), ("load", felt.load), ("torque", felt.torque))
-        told |= {
+        stated |= {
             ("axle_torque" if name == "torque" else name): shown(name, values)
             for name, values in wrench
         }
-    return told
+    return stated
 
 
 def configuration(known: Knowledge, nominal: float) -> str:

@@ -1,4 +1,4 @@
-"""Held-out errors that a diagnosis reports, beside those of the noiseless truth."""
+"""Held-out errors that a diagnosis reports, compared with those of the noiseless truth."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def errors(
         if path.exists():
             with np.load(path) as truth:
                 if trace["channel"] in truth:
-                    told = begins[trace["run"]] + truth["time"], truth[trace["channel"]]
-                    sums.setdefault(trace["channel"], []).append(_squares(trace, *told))
+                    truth_of = begins[trace["run"]] + truth["time"], truth[trace["channel"]]
+                    sums.setdefault(trace["channel"], []).append(_squares(trace, *truth_of))
 
     return {channel: _roots(np.concatenate(parts, axis=1)) for channel, parts in sums.items()}
 

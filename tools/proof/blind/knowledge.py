@@ -86,7 +86,7 @@ def ground_drawn(rng: np.random.Generator) -> tuple[str, PlantSoil]:
 
 
 def soil_known(ground: PlantSoil, rng: np.random.Generator) -> dict[str, Stated]:
-    """What a bevameter told: the truth and an error, within the sigma it states."""
+    """What a bevameter measured: the truth and an error, within the sigma it states."""
     relative = {
         "cohesion": float(rng.uniform(0.15, 0.35)),
         "tan_phi": float(rng.uniform(0.04, 0.1)),

@@ -106,13 +106,13 @@ def diagnose(spec: WorkerSpec) -> dict[str, Any]:
 def _command(spec: WorkerSpec) -> list[str]:
     """What an engineer would type in the folder of what was handed over."""
     result = str((spec.folder / RESULT).resolve())
-    told = ["--config", handover.CONFIGURATION, "--json", result]
-    told += ["--jobs", "1"]  # cases run side by side
+    options = ["--config", handover.CONFIGURATION, "--json", result]
+    options += ["--jobs", "1"]  # cases run side by side
     if not spec.assignment.pair:
-        return [*spec.diagnose, *_recordings(spec, ""), *told]
-    told += ["--bed", spec.assignment.bed]
+        return [*spec.diagnose, *_recordings(spec, ""), *options]
+    options += ["--bed", spec.assignment.bed]
     before = ["--reference", *_recordings(spec, handover.REFERENCE)]
-    return [*spec.diagnose, *_recordings(spec, handover.NEW), *before, *told]
+    return [*spec.diagnose, *_recordings(spec, handover.NEW), *before, *options]
 
 
 def _recordings(spec: WorkerSpec, folder: str) -> list[str]:

@@ -1,5 +1,5 @@
-"""What the diagnosis said of one case, beside what was true: one row of the score, before any
-counting.
+"""What the diagnosis said of one case, compared with what was true: one row of the score, before
+any counting.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def handed_over(bench: Bench, folder: Path) -> float:
     return nan if bench.stratum in CHANGES else sigma_of_c(bench, tables)
 
 
-def told(folder: Path) -> dict[str, Any]:
+def estimate_of(folder: Path) -> dict[str, Any]:
     """What `gritd estimate` says of the tables in a folder. Raises CommandError."""
     tables = [str(path) for path in sorted(folder.glob("run_*.csv"))]
     stated = folder / CONFIGURATION
@@ -80,8 +80,8 @@ def _called(makes: Path, *arguments: str) -> None:
 
 
 def scored(bench: Bench, folder: Path, exact: float) -> Score:
-    """The bench opened: what was said of it beside the truth."""
-    found = told(folder)
+    """The bench opened: what was said of it compared with the truth."""
+    found = estimate_of(folder)
     together, ground = found["together"], bench.ground
     sigma = np.array([together["c"]["sigma"], together["tan_phi"]["sigma"]])
     error = np.array(

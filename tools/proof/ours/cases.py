@@ -203,7 +203,7 @@ def rig_of(
     reference: Sequence[tuple[Signals, FullRate]] = (),
     bed: Bed = "prepared",
 ) -> WheelRig:
-    """The rig of a case, its ripples told at full rate. reference: runs in which nothing is new."""
+    """The rig of a case, its ripples given at full rate. reference: runs with nothing new."""
     every = [*reference, *record_fully(plan, acting)]
     signals, full = zip(*every, strict=True)
 

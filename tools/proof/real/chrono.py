@@ -130,7 +130,7 @@ def _soil(diagnosis: DiagnosisRun, name: str, true: float) -> Check:
 
 WHY = """
 The lugs dig in over 0.1 m of travel, and deeper with slip. That is a part of what they do, but the
-form of `grousers` allows less of it: what is named beside them says the rest.
+form of `grousers` allows less of it: what is named with them says the rest.
 """
 
 TERRAIN = Proof(

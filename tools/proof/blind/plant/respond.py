@@ -40,7 +40,7 @@ class World:
 
 @dataclass(frozen=True)
 class Commanded:
-    """What the controllers are told, arrays (n,) at a fixed step."""
+    """What the controllers are commanded, arrays (n,) at a fixed step."""
 
     time: Array  # [s] since the campaign began
     omega: Array  # [rad/s]

@@ -23,8 +23,8 @@ class Servo:
 
 
 def follow(servo: Servo, wanted: Array, against: Array, step: float, substeps: int = 2) -> Array:
-    """Speed (n,) of an axis told to run at `wanted` (n,) while the force or torque `against` (n,)
-    holds it back.
+    """Speed (n,) of an axis commanded to run at `wanted` (n,) while the force or torque `against`
+    (n,) holds it back.
 
     Fixed steps, implicit in the speed: m u̇ = P (u* − u) + (P/T)∫(u* − u)dt − F. Starts at rest in
         balance.

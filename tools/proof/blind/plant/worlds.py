@@ -1,4 +1,4 @@
-"""Worlds in which a testbed may stand. In one of them Eqs. (1)-(10) hold; the diagnosis is told of
+"""Worlds in which a testbed may stand. In one of them Eqs. (1)-(10) hold; the diagnosis knows of
 none.
 """
 

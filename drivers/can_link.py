@@ -127,7 +127,7 @@ class CanLink:
         if isinstance(error.__cause__, UnicodeDecodeError) and self._bus is not None:
             with suppress(
                 Exception
-            ):  # slcan keeps an undecodable line for ever, unless it is told to drop it
+            ):  # slcan keeps an undecodable line for ever, unless it is asked to drop it
                 self._bus._buffer.clear()  # type: ignore[attr-defined]
 
     def close(self) -> None:
@@ -135,7 +135,7 @@ class CanLink:
         self._unlock()
         if bus is None:
             return
-        with suppress(Exception):  # a device that is gone cannot be told to stop
+        with suppress(Exception):  # a device that is gone cannot be stopped
             bus.shutdown()
         with suppress(Exception):  # slcan leaves its port open where that failed
             bus.serialPortOrig.close()  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from gritd import __version__
-from gritd.estimator.config.nearest import did_you_mean
+from gritd.estimator.config.nearest import did_you_mean, listed
 from gritd.tools.cli import memory
 from gritd.tools.cli.command import Parser
 from gritd.tools.cli.guard import guarded
@@ -87,7 +87,7 @@ def _command(text: str) -> str:
     if text not in COMMANDS:
         raise argparse.ArgumentTypeError(
             f"found no command {text[:40]!r}{did_you_mean(text, COMMANDS)}; "
-            f"expected one of {', '.join(COMMANDS)}"
+            f"expected one of {listed([*COMMANDS])}"
         )
     return text
 

@@ -4,15 +4,14 @@ expects.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 from gritd.estimator.config import units
+from gritd.estimator.config.nearest import did_you_mean, listed
 from gritd.estimator.config.yamltree import Node, Scalar, YamlSequence, describe, shown
 
 UNLIMITED = "unlimited"
@@ -197,19 +196,13 @@ class Choice:
 
     @property
     def expected(self) -> str:
-        return "one of " + ", ".join(self.words)
+        return f"one of {listed(self.words)}"
 
     def read(self, node: Node) -> tuple[str, Node]:
         text = scalar(node, self.expected)
         if text not in self.words:
-            raise node.place.error(describe(node) + nearest(text, self.words), self.expected)
+            raise node.place.error(describe(node) + did_you_mean(text, self.words), self.expected)
         return text, node
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """A hint at the known word that resembles this one most, or nothing."""
-    close = difflib.get_close_matches(word[:64], list(words), n=1)
-    return f" (did you mean {close[0]}?)" if close else ""
 
 
 def scalar(node: Node, expected: str) -> str:

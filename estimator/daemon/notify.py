@@ -1,4 +1,4 @@
-"""What a service manager is told: the sd_notify protocol, one datagram a message (man 3 sd_notify).
+"""What a service manager is sent: the sd_notify protocol, one datagram a message (man 3 sd_notify).
 
 Without a service manager nothing is sent, and nobody has to ask.
 """

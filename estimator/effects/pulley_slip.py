@@ -11,8 +11,8 @@ from gritd.estimator.terramechanics.soil import Wheel
 
 @dataclass(frozen=True)
 class PulleySlip(Effect):
-    """The carriage belt slips on the encoder's pulley, so the carriage travels farther than it is
-    told.
+    """The carriage belt slips on the encoder's pulley, so the carriage travels farther than its
+    encoder counts.
 
     v = (1 + s) v_read,   x = (1 + s) x_read
 

@@ -84,4 +84,4 @@ def test_a_wrong_torque_constant_is_told_everywhere(tmp_path, figure):
     said = [line for line in log_lines(daemon.path()) if "is not believed" in line]
     assert said and len(said) == len(daemon.lines("is not believed"))
     assert verified(daemon.path())
-    figure(DEPTH, WIRES, "lines until it was told", len(said), "")
+    figure(DEPTH, WIRES, "lines until it was reported", len(said), "")

@@ -3,7 +3,7 @@ before it.
 
     python -m gritd.tools.bench.control HERTZ FILE.npy
 
-It wakes at a rate and notes how late, until it is told to end; then it writes the deadlines [ns of
+It wakes at a rate and notes how late, until it is asked to end; then it writes the deadlines [ns of
 the daemon's clock] and latenesses [ns], shape (n, 2). Nothing of gritd runs in it, and it
 interrupts the daemon: when it is late, the system or the virtual machine held the core.
 """

@@ -50,7 +50,7 @@ def cluster(address: str) -> Iterator[tuple[Executor, int]]:
         raise CommandError(f"--scheduler {address}: {reason}; {KEPT}", FAILED) from None
     finally:
         over.set()
-        with suppress(Exception):  # a scheduler that is gone cannot be told
+        with suppress(Exception):  # a scheduler that is gone cannot be asked
             client.close(timeout=ANSWER)
 
 

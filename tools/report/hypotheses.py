@@ -1,4 +1,4 @@
-"""Hypotheses as a ranked list with bars; those that the recordings cannot tell apart stand in one
+"""Hypotheses as a ranked list with bars; those that the recordings cannot distinguish stand in one
 box.
 """
 

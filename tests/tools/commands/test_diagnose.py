@@ -43,16 +43,6 @@ def said(*arguments: object) -> tuple[str, int]:
     return str(error.value), error.value.code
 
 
-def test_a_run_given_twice_is_refused(run: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy.mcap"
-    copy.write_bytes(run.read_bytes())
-    line, code = said(run, copy, "--config", packaged())
-    assert (
-        line == f"{copy}: found the same recording as {run}; expected each run once"
-        and code == USAGE
-    )
-
-
 def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
     before = run.read_bytes()
     for option in ("--json", "--report", "--apply"):
@@ -95,13 +85,6 @@ def test_the_files_that_were_written_are_told(
 
     assert main(one) == 0
     assert "wrote" not in capsys.readouterr().err
-
-
-def test_a_scheduler_without_campaigns_is_refused(run: Path) -> None:
-    """It would not be used, and whether it proves who it is not be asked."""
-    for address in ("tcp://127.0.0.1:9999", "tls://127.0.0.1:9999"):
-        line, code = said(run, "--config", packaged(), "--scheduler", address)
-        assert line == "diagnose --scheduler: expected --campaigns DIR with it" and code == USAGE
 
 
 def test_the_configuration_that_is_read_is_replaced_only_when_asked(
@@ -196,11 +179,6 @@ def test_the_configuration_of_another_testbed_is_refused(
         packaged().read_text(encoding="utf-8").replace("25 mm/V", "30 mm/V", 1), "", tmp_path
     )
     provenance.check_rig(read_all([run]), mended.settings, "mended.yaml")
-
-
-def test_a_bed_without_a_reference_is_refused(run: Path) -> None:
-    line, code = said(run, "--config", packaged(), "--bed", "same")
-    assert line == "diagnose --bed: expected --reference REF… with it" and code == USAGE
 
 
 def test_a_reference_is_the_recording_that_was_diagnosed(run: Path, tmp_path: Path) -> None:

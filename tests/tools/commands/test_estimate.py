@@ -61,15 +61,6 @@ def test_a_stated_repeatability_widens_what_they_know(runs, tmp_path, capsys):
     assert "repeatability between preparations, σ: c 50 Pa" in capsys.readouterr().out
 
 
-def test_a_run_on_another_soil_is_said_or_left_out(runs, tmp_path, capsys):
-    folder = tmp_path / "other"
-    folder.mkdir()
-    other = made(folder, 80, "--soil=tan_phi=0.65")
-    found = told([*runs, other], tmp_path / "out.json")
-    said = capsys.readouterr().out
-    assert "run-80.mcap does not fit the runs before it" in said or not found["runs"][-1]["used"]
-
-
 def test_another_configuration_and_a_mistyped_name_are_refused(runs, tmp_path, capsys):
     (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
     text = packaged().read_text().replace("sigma: 300 Pa", "sigma: 100 Pa")

@@ -240,13 +240,6 @@ def test_wrong_option_is_one_line(tmp_path: Path, options: list[str], said: str)
     assert not (tmp_path / "x.mcap").exists()
 
 
-def test_bogged_wheel_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "heavy.yaml"
-    path.write_text("segments:\n  - {duration: 1 s, load: 5 kN, slip: 0.2, speed: 20 mm/s}")
-    main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
-    assert "exceeds what the soil carries in 250 samples" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(("second", "stated"), [(60.0, 60.0), (80.0, None)])
 def test_a_run_at_one_load_states_it(second: float, stated: float | None, tmp_path: Path) -> None:
     """Else a diagnosis would take the configuration's nominal load for the run's."""

@@ -124,7 +124,7 @@ def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path
     campaign = ViewedCampaign(paths)
     assert campaign.answer == {"state": "computing"}
     campaign._run()
-    assert campaign.answer["state"] == "done" and len(campaign.told["runs"]) == 2
+    assert campaign.answer["state"] == "done" and len(campaign.answer["runs"]) == 2
     for run in campaign.answer["runs"]:
         assert [round(part["load"], -1) for part in run["loads"]] == [40.0, 80.0]
         for part in run["loads"]:
@@ -137,7 +137,7 @@ def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path
 def test_a_campaign_that_cannot_be_computed_says_why(tmp_path: Path) -> None:
     campaign = ViewedCampaign([tmp_path / "none.mcap"])
     campaign._run()
-    assert campaign.answer["state"] == "failed" and "none.mcap" in campaign.told["reason"]
+    assert campaign.answer["state"] == "failed" and "none.mcap" in campaign.answer["reason"]
 
 
 @pytest.mark.slow

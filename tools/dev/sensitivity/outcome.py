@@ -21,7 +21,7 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
 from gritd.tools.diagnose.verdict.decide import decide
 
-Handed = Callable[..., None]  # is told all that a room hands on, before the next one has it
+Handed = Callable[..., None]  # is given all that a room hands on, before the next one has it
 Diagnose = Callable[[Path, Handed], "DiagnosisOutcome"]
 
 

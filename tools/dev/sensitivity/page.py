@@ -19,8 +19,8 @@ odds, quantiles in the odds of their tail. The columns "verdicts" and "names" co
 which the verdict, or the names that it accepts, are another, and say which campaigns they are of.
 Δp is the largest change of an effect's probability. Δtan φ is the largest change of the soil's
 tan φ, in its standard deviation. A number that a campaign does not read before its verdict is not
-run on it: it can change only what is told of the verdict. The reason of each number, and what it
-was learnt from, stand in `tools/diagnose/tuning/`.
+run on it: it can change only what is reported of the verdict. The reason of each number, and what
+it was learnt from, stand in `tools/diagnose/tuning/`.
 
 A diagnosis does not depend on a number before it reads it. So each diagnosis with another number is
 forked from the one with the numbers as they are, where the number is first read. It ends as soon as

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gritd.estimator.config.nearest import did_you_mean
+from gritd.estimator.config.nearest import did_you_mean, listed
 from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.times import Nanoseconds
 
 SHOWN = 40  # characters of a name in a message
-ROOM = 120  # of several
 Advance = Callable[[int], None]  # takes the bytes of a file that were read
 COMPARED = 2000  # names with which a mistyped one is compared
 FEW = 5  # rows that are reported one by one
@@ -103,7 +102,7 @@ class SeriesTable:
 
     def names(self) -> str:
         """Of all columns, as many as a line has room for."""
-        return shortened(list(self.columns))
+        return listed(list(self.columns))
 
     def at(self, chosen: NDArray[np.bool_]) -> SeriesTable:
         """The rows that are marked (n,)."""
@@ -146,20 +145,8 @@ def no_column(path: Path, name: str, known: Sequence[str]) -> RigFileError:
     """That a file has no column of a name, with those that it has."""
     meant = did_you_mean(name, known[:COMPARED])
     return RigFileError(
-        f"{path}: found no column {name[:SHOWN]!r}{meant}; expected one of {shortened(known)}"
+        f"{path}: found no column {name[:SHOWN]!r}{meant}; expected one of {listed(known)}"
     )
-
-
-def shortened(names: Sequence[str]) -> str:
-    """Names with commas, as many as a line has room for."""
-    named: list[str] = []
-    length = 0
-    for name in names:
-        length += len(name) + 2
-        if length > ROOM:
-            return f"{', '.join(named)} … ({len(names)} in all)"
-        named.append(name[:SHOWN])
-    return ", ".join(named)
 
 
 def row_numbers(numbers: Sequence[int]) -> str:

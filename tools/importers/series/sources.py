@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.config.nearest import listed
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import LARGEST, RigFileError, below
 from gritd.tools.importers.formats import registry
@@ -22,7 +23,6 @@ from gritd.tools.importers.series.columns import (
     SeriesTable,
     Wanted,
     no_column,
-    shortened,
 )
 from gritd.tools.importers.series.mapping import CLOCK, DATE, TIME, Mapped, MapSource, SeriesMap
 
@@ -221,7 +221,7 @@ def _place(path: Path, tables: Sequence[SeriesTable], name: str) -> Place:
     if short:
         raise RigFileError(
             f"{path}: found {name!r} in several groups; expected one of "
-            f"{shortened([full for _, full in short])}",
+            f"{listed([full for _, full in short])}",
             USAGE,
         )
 

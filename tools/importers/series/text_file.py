@@ -195,7 +195,7 @@ def _zip(path: Path, file: BinaryIO) -> Readable:
 
 
 class _Zst:
-    """The content of a zstd file, frame after frame. One that ends within a frame is told, as
+    """The content of a zstd file, frame after frame. One that ends within a frame is reported, as
     Python's own readers tell it.
     """
 

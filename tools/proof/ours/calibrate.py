@@ -44,7 +44,7 @@ class WeighedCase:
 
     evidence: Array  # [nats]
     count: Array  # listed effects
-    nameless: Array  # 1 where functions without a name act too
+    nameless: Array  # 1 where unexplained terms act too
     right: Array
     candidates: int
 

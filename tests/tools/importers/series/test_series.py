@@ -10,7 +10,7 @@ import pytest
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.salvage import read
-from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.commands.import_rig import main
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.noise import scatter
@@ -60,11 +60,6 @@ def test_a_text_of_any_usual_encoding(tmp_path: Path, encoding: str, first: str)
     found = csv_text.read(tmp_path / "other.csv")
     assert list(found.columns) == ["t", first, "v", "M"]
     assert found.rows == 250 and found.columns["v"].numbers[-1] == 60.0
-
-
-def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "photo.csv").write_bytes(b"t,v\n\xff\x00\x01,2\n")
-    assert "no text" in complaint(DAMAGED, tmp_path / "photo.csv", "--guess")
 
 
 def test_empty_columns_and_separators_at_the_end_hold_nothing(tmp_path: Path) -> None:
@@ -256,11 +251,6 @@ def test_counts_kept_as_floats_are_counts(tmp_path: Path, factor: float) -> None
     assert counts.tolist() == way.tolist()
 
 
-def test_a_header_without_rows_is_told(tmp_path: Path) -> None:
-    (tmp_path / "run.csv").write_text("t,rpm,v,M\n")
-    assert "found no rows" in complaint(DAMAGED, tmp_path / "run.csv", "--guess")
-
-
 def test_speeds_become_counts_that_give_them_back(tmp_path: Path) -> None:
     output = imported(tmp_path, table(tmp_path))
     settings = config.load(output / "csv.yaml").settings
@@ -318,29 +308,6 @@ def test_slow_data_slow_the_filter_and_its_patience(tmp_path: Path) -> None:
     assert settings.channels["wheel_encoder"].stale_after == pytest.approx(0.5)
 
 
-def test_what_cannot_be_imported_is_one_line(tmp_path: Path) -> None:
-    run = table(tmp_path)
-    (tmp_path / "map.yaml").write_text(MAP)
-    options = ("--map", tmp_path / "map.yaml", "-o", tmp_path / "out")
-
-    def changed(old: str, new: str) -> str:
-        (tmp_path / "bad.csv").write_text(run.read_text().replace(old, new, 1))
-        return complaint(DAMAGED, tmp_path / "bad.csv", *options)
-
-    assert "row 5: M: found 'broken" in changed("\n0.06,10.0,60.0,", "\n0.06,10.0,60.0,broken")
-    assert "found no column 'rpm'; expected one of t, w, v, M" in changed("rpm", "w")
-    assert "found nothing there" in complaint(USAGE, tmp_path / "none.csv", *options)
-    assert "expected --map" in complaint(USAGE, run, "-o", tmp_path / "out")
-    assert "expected -o" in complaint(USAGE, run, "--map", tmp_path / "map.yaml")
-
-    (tmp_path / "map.yaml").write_text(MAP.replace("load: 50 N", "runs: {other: {load: 3 N}}"))
-    assert "'other', which is no run" in complaint(USAGE, run, *options)
-    (tmp_path / "map.yaml").write_text(MAP.replace("wheel: {radius: 72 mm, width: 71 mm}", ""))
-    assert "expected its radius and width, or --config" in complaint(USAGE, run, *options)
-    (tmp_path / "map.yaml").write_text(MAP.replace("  v:", "  # v:"))
-    assert "for the carriage_encoder" in complaint(USAGE, run, *options)
-
-
 def test_a_guess_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One of them would not be used."""
     with pytest.raises(SystemExit) as stop:
@@ -348,18 +315,6 @@ def test_a_guess_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     said = capsys.readouterr()
     assert stop.value.code == 2 and said.out == "" and said.err.count("\n") == 1
     assert "--map: not allowed with argument --guess" in said.err
-
-
-def test_noise_that_cannot_be_estimated_is_asked_for(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    t = np.arange(0.0, 5.0, 0.02)
-    savemat(tmp_path / "run.mat", {"t": t, "rpm": 10 + t, "v": 60 + t, "M": np.full(t.size, 3.1)})
-    (tmp_path / "map.yaml").write_text(MAP)
-    line = complaint(
-        USAGE, tmp_path / "run.mat", "--map", tmp_path / "map.yaml", "-o", tmp_path / "out"
-    )
-    assert "M: never changes" in line and "noise: in the map" in line
 
 
 @pytest.mark.parametrize("sigma", [0.02, 0.3])
@@ -395,12 +350,3 @@ def test_series_and_csv_are_one_command(tmp_path: Path) -> None:
         main(["series", str(tmp_path)])
     with pytest.raises(CommandError, match="--map"):
         main(["csv", str(tmp_path)])
-
-
-def test_a_column_without_any_number_is_named(tmp_path: Path) -> None:
-    log = table(tmp_path)
-    lines = log.read_text().splitlines()
-    log.write_text("\n".join([lines[0], *(line.rpartition(",")[0] + ",nan" for line in lines[1:])]))
-    (tmp_path / "map.yaml").write_text(MAP)
-    options = (log, "--map", tmp_path / "map.yaml", "-o", tmp_path / "out")
-    assert "M: found no number" in complaint(USAGE, *options)

@@ -98,7 +98,7 @@ def build_parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME.PARAMETER=VALUE",
-        help="physics to act in the runs and not to be told: see gritd effects",
+        help="physics that acts in the runs and is not stated: see gritd effects",
     )
 
     return parser

@@ -8,6 +8,8 @@ them on drawn values.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 try:
     from gritd.estimator.compiled import algebra
     from gritd.estimator.compiled.algebra import dot, mixed, update, variance
@@ -18,7 +20,20 @@ except ImportError:  # no compiler where gritd was installed
 else:
     BUILT = True
 
-__all__ = ["BUILT", "Closed", "dot", "evidence", "mixed", "total", "update", "variance"]
+__all__ = [
+    "BUILT",
+    "Closed",
+    "dot",
+    "evidence",
+    "integer_sum",
+    "mixed",
+    "total",
+    "update",
+    "variance",
+]
+
+# the one `sum` of estimator: integers, which no order and no version of Python adds otherwise
+integer_sum: Callable[[Iterable[int]], int] = sum
 
 
 def total(values: list[float]) -> float:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter import form_error
@@ -94,7 +95,7 @@ class Measurement:
         form = size**2 * form_error.prior()
         parts = [soil, np.diag(known), *[form] * len(self.components)]
 
-        total = sum(len(part) for part in parts)
+        total = integer_sum(len(part) for part in parts)
         P, at = np.zeros((total, total)), 0
         for part in parts:
             P[at : at + len(part), at : at + len(part)] = part

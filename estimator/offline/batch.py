@@ -16,6 +16,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import Account, aids, health, measurements, soil_estimate
 from gritd.estimator.filter.bank import Bank, reported
@@ -149,7 +150,7 @@ def followed(
 
     rows: list[bytes] = []
     every = windows(settings, streams)
-    total, done = sum(len(part.ends) for part in every), 0
+    total, done = integer_sum(len(part.ends) for part in every), 0
     for part in every:
         state = state._replace(window=part.length, choosing=part.choosing)
         for snapshot in _snapshots(settings, streams, part):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.limits import limits, raised
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.offline.windows import Ints
@@ -35,7 +36,7 @@ def built_ticks(received: Ints, period: int) -> Ints:
         *(tick_after(start, period, int(t) + GAP) for t in received[breaks]),
         tick_after(start, period, int(received[-1])),
     ]
-    check_ticks(sum((b - a) // period + 1 for a, b in zip(first, last, strict=True)))
+    check_ticks(integer_sum((b - a) // period + 1 for a, b in zip(first, last, strict=True)))
 
     stretches = [np.arange(a, b + 1, period) for a, b in zip(first, last, strict=True)]
     return np.unique(np.concatenate(stretches))
@@ -64,7 +65,7 @@ def edges_of(beats: Array, start: float, end: float, rate: float) -> Array:
     bounds = [0.0, *np.column_stack((first, last)).ravel().tolist(), float(count)]
     stretches = list(zip(bounds[::2], bounds[1::2], strict=True))
     most = limits().grid
-    if sum(b - a + 1 for a, b in stretches) > most:
+    if integer_sum(b - a + 1 for a, b in stretches) > most:
         raise RecordingError(f"its readings fill more than {most:.0f} points; {raised('grid')}")
 
     return start + np.concatenate([np.arange(a, b + 1) for a, b in stretches]) / rate

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.readings import ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.status import CHANNEL_BITS
@@ -390,7 +391,14 @@ def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> in
         return 0
 
     t, x = (stamp - stamp[0]).tolist(), (counts - counts[0]).tolist()
-    spread = count * sum([a * a for a in t]) - sum(t) ** 2
-    rate = (count * sum([a * b for a, b in zip(t, x, strict=True)]) - sum(t) * sum(x)) / spread * NS
+    spread = count * integer_sum([a * a for a in t]) - integer_sum(t) ** 2
+    rate = (
+        (
+            count * integer_sum([a * b for a, b in zip(t, x, strict=True)])
+            - integer_sum(t) * integer_sum(x)
+        )
+        / spread
+        * NS
+    )
     expected: int = round(rate * elapsed / NS)
     return expected

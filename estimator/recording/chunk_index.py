@@ -14,6 +14,8 @@ from collections.abc import Iterator, Sequence
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 
+from gritd.estimator.compiled.arithmetic import integer_sum
+
 # gap before, length, first log_time since the last one, span, unpacked size; channels
 _ROW = struct.Struct("<5QH")
 _CHANNEL = struct.Struct("<HQ")  # its number, length of its MessageIndex record
@@ -60,7 +62,7 @@ class ChunkIndexes:
             row + b"".join(_CHANNEL.pack(*index) for index in indexes)
         )
 
-        self._end = start + length + sum(length for _, length in indexes)
+        self._end = start + length + integer_sum(length for _, length in indexes)
         self._time = times[0]
         self.count += 1
 

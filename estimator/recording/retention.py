@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.recording.mcapfile import DRAFT, RecordingError
 from gritd.estimator.recording.walk import Walk
 
@@ -53,7 +54,7 @@ def trim(folder: Path, cap: float, open_files: Collection[Path]) -> Iterator[Pat
     """
     stored = sorted(_sizes(folder))
     kept = {path.absolute() for path in open_files}
-    excess = sum(size for _, size, _ in stored) - cap
+    excess = integer_sum(size for _, size, _ in stored) - cap
     failure = None
 
     for _, size, path in stored:

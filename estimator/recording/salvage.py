@@ -18,6 +18,7 @@ from typing import BinaryIO
 import numpy as np
 from mcap.opcode import Opcode
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import Block, Damaged, Unpacker, records, split, unpack
@@ -247,7 +248,7 @@ class RecordingCheck:
     def _ends_within(self, blocks: Sequence[Block]) -> bool:
         """Whether reading might end inside a pile; `_ending` then says where."""
         bounds = limits()
-        unpacked = self._unpacked + sum(block.size for block in blocks)
+        unpacked = self._unpacked + integer_sum(block.size for block in blocks)
         stored = self._stored
 
         return (
@@ -315,7 +316,7 @@ class RecordingCheck:
         recording._piles.append(tuple(blocks))
 
         sizes = np.diff(pile.cuts).tolist()
-        recording.unverified += sum(
+        recording.unverified += integer_sum(
             size for block, size in zip(blocks, sizes, strict=True) if not block.crc
         )
         for channel, own in chunk.groups.items():
@@ -359,8 +360,8 @@ class RecordingCheck:
         recording.counted = bool(expected)
         if expected:
             differ = [n - counted.get(channel, 0) for channel, n in expected.items()]
-            recording.lost = sum(max(0, difference) for difference in differ)
-            surplus = sum(max(0, -difference) for difference in differ)
+            recording.lost = integer_sum(max(0, difference) for difference in differ)
+            surplus = integer_sum(max(0, -difference) for difference in differ)
         else:
             recording.lost, surplus = self._sequence.missing if numbered else 0, 0
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from gritd.estimator.compiled.arithmetic import integer_sum
+
 _WRAP = 1 << 32  # numbers begin again there
 
 
@@ -33,7 +35,7 @@ class ChunkSequence:
     @property
     def missing(self) -> int:
         """Messages that are missing between the first and the last."""
-        return sum(max(0, counted.missing) for counted in self._channels.values())
+        return integer_sum(max(0, counted.missing) for counted in self._channels.values())
 
     def counts(self) -> dict[int, int]:
         """Messages by channel."""

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from math import isnan
 from typing import Any, NamedTuple
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.config.settings import Channel, Settings
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import CHANNEL_BITS
@@ -254,7 +255,7 @@ class Sync:
         """Bits of channels whose last bytes came longer ago than they may; a channel never heard of
         counts too.
         """
-        return sum(
+        return integer_sum(
             CHANNEL_BITS[name]
             for name, limit in self._stale_after.items()
             if t - self.received.get(name, -limit) > limit

@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import hypot, isnan, pi, sqrt
 from typing import NamedTuple
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import ENCODERS, MOTION, NS
 from gritd.estimator.messages.replacing import quickly_replaced
@@ -55,7 +56,7 @@ def required(settings: Settings) -> tuple[str, ...]:
 
 def required_bits(settings: Settings) -> int:
     """Their CHANNEL_BITS."""
-    return sum([CHANNEL_BITS[name] for name in required(settings)])
+    return integer_sum([CHANNEL_BITS[name] for name in required(settings)])
 
 
 @quickly_replaced

@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall lock wheel deb clean
+.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall release lock wheel deb clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -79,7 +79,10 @@ fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody mea
 soak: $(READY) ## 100 simulated hours, then the daemon on wires for an hour under load
 	@$(BIN)/python -m gritd.tools.dev.soak
 
-lock: ## config/requirements.lock anew, with the newest releases (needs uv)
+release: ## build, check and try what is published, into dist/; see docs/release.md
+	@PYTHON="$(PYTHON)" tools/release
+
+lock: ## the lists of config/*.lock anew, with the newest releases (needs uv)
 	@tools/lock
 
 install: ## lay gritd out on this Debian system (DESTDIR=… for a package); see docs/service.md

@@ -20,7 +20,13 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[1]
 SOURCES = ("gritd", "estimator", "drivers", "config", "tools")
 PAGES = ("pyproject.toml", "README.md", "LICENSE")
-OF_THE_CHECKOUT = {"gritd/config/requirements.lock", "gritd/tools/install", "gritd/tools/lock"}
+OF_THE_CHECKOUT = {  # scripts and what they install
+    "gritd/config/release.lock",
+    "gritd/config/requirements.lock",
+    "gritd/tools/install",
+    "gritd/tools/lock",
+    "gritd/tools/release",
+}
 DEVELOPMENT = (
     "gritd/tools/debian",
     "gritd/tools/dev",

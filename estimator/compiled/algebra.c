@@ -23,11 +23,11 @@ static PyObject *dot_of(PyObject *module, PyObject *const *given, Py_ssize_t cou
         PyErr_SetString(PyExc_TypeError, "expected two tuples");
         return NULL;
     }
-    const Py_ssize_t one = PyTuple_GET_SIZE(given[0]), other = PyTuple_GET_SIZE(given[1]);
+    const Py_ssize_t one = PyTuple_Size(given[0]), other = PyTuple_Size(given[1]);
     double total = 0.0;
     for (Py_ssize_t n = 0; n < (one < other ? one : other); n++) {
-        const double a = PyFloat_AsDouble(PyTuple_GET_ITEM(given[0], n));
-        const double b = PyFloat_AsDouble(PyTuple_GET_ITEM(given[1], n));
+        const double a = PyFloat_AsDouble(PyTuple_GetItem(given[0], n));
+        const double b = PyFloat_AsDouble(PyTuple_GetItem(given[1], n));
         if ((a == -1.0 || b == -1.0) && PyErr_Occurred()) return NULL;
         total += a * b;
     }
@@ -47,12 +47,12 @@ static PyObject *variance(PyObject *module, PyObject *const *given, Py_ssize_t c
     (void)module;
     double h[MOST], m[MOST];
     const double *P;
-    if (count != 2 || !PyTuple_Check(given[1]) || PyTuple_GET_SIZE(given[1]) < 1 ||
-        PyTuple_GET_SIZE(given[1]) > MOST) {
+    if (count != 2 || !PyTuple_Check(given[1]) || PyTuple_Size(given[1]) < 1 ||
+        PyTuple_Size(given[1]) > MOST) {
         PyErr_SetString(PyExc_TypeError, "expected a covariance and a gradient");
         return NULL;
     }
-    const Py_ssize_t d = PyTuple_GET_SIZE(given[1]);
+    const Py_ssize_t d = PyTuple_Size(given[1]);
     if (!read_packed(given[0], d * d, &P) || !read_vector(given[1], d, h)) return NULL;
 
     times(P, h, d, m);
@@ -68,12 +68,12 @@ static PyObject *update(PyObject *module, PyObject *const *given, Py_ssize_t cou
     double m[COMPONENTS][MOST], u[COMPONENTS][MOST], s[COMPONENTS], score[COMPONENTS];
     const double *P;
     if (count != 5 || !PyTuple_Check(given[0]) || !PyTuple_Check(given[2]) ||
-        PyTuple_GET_SIZE(given[0]) < 1 || PyTuple_GET_SIZE(given[0]) > MOST ||
-        PyTuple_GET_SIZE(given[2]) < 1 || PyTuple_GET_SIZE(given[2]) > COMPONENTS) {
+        PyTuple_Size(given[0]) < 1 || PyTuple_Size(given[0]) > MOST ||
+        PyTuple_Size(given[2]) < 1 || PyTuple_Size(given[2]) > COMPONENTS) {
         PyErr_SetString(PyExc_ValueError, "expected an estimate and one or two components");
         return NULL;
     }
-    const Py_ssize_t d = PyTuple_GET_SIZE(given[0]), components = PyTuple_GET_SIZE(given[2]);
+    const Py_ssize_t d = PyTuple_Size(given[0]), components = PyTuple_Size(given[2]);
     if (!read_vector(given[0], d, x) || !read_packed(given[1], d * d, &P) ||
         !read_vector(given[2], components, y) || !read_matrix(given[3], components, d, MOST, H[0]) ||
         !read_matrix(given[4], components, components, COMPONENTS, R[0]))
@@ -105,7 +105,7 @@ static PyObject *update(PyObject *module, PyObject *const *given, Py_ssize_t cou
 
     PyObject *packed = PyBytes_FromStringAndSize(NULL, d * d * (Py_ssize_t)sizeof(double));
     if (packed == NULL) return NULL;
-    double *after = (double *)PyBytes_AS_STRING(packed);
+    double *after = (double *)PyBytes_AsString(packed);
     memcpy(after, P, (size_t)(d * d) * sizeof(double));
     for (Py_ssize_t n = 0; n < components; n++) {
         for (Py_ssize_t i = 0; i < d; i++) x[i] = x[i] + u[n][i] * score[n];
@@ -127,38 +127,38 @@ static PyObject *mixed(PyObject *module, PyObject *const *given, Py_ssize_t coun
     (void)module;
     double x[MOST] = {0.0}, own[MOST], off[MOST];
     if (count != 2 || !PyList_Check(given[0]) || !PyTuple_Check(given[1]) ||
-        PyList_GET_SIZE(given[0]) < 1 ||
-        PyList_GET_SIZE(given[0]) != PyTuple_GET_SIZE(given[1])) {
+        PyList_Size(given[0]) < 1 ||
+        PyList_Size(given[0]) != PyTuple_Size(given[1])) {
         PyErr_SetString(PyExc_TypeError, "expected a list of estimates and as many weights");
         return NULL;
     }
-    const Py_ssize_t members = PyList_GET_SIZE(given[0]);
+    const Py_ssize_t members = PyList_Size(given[0]);
     Py_ssize_t d = 0;
     for (Py_ssize_t n = 0; n < members; n++) {
-        PyObject *member = PyList_GET_ITEM(given[0], n);
-        const int pair = PyTuple_Check(member) && PyTuple_GET_SIZE(member) == 2 &&
-                         PyTuple_Check(PyTuple_GET_ITEM(member, 0));
-        if (pair && n == 0) d = PyTuple_GET_SIZE(PyTuple_GET_ITEM(member, 0));
+        PyObject *member = PyList_GetItem(given[0], n);
+        const int pair = PyTuple_Check(member) && PyTuple_Size(member) == 2 &&
+                         PyTuple_Check(PyTuple_GetItem(member, 0));
+        if (pair && n == 0) d = PyTuple_Size(PyTuple_GetItem(member, 0));
         if (!pair || d < 1 || d > MOST) {
             PyErr_SetString(PyExc_ValueError, "expected pairs of a mean and a covariance");
             return NULL;
         }
-        const double weight = PyFloat_AsDouble(PyTuple_GET_ITEM(given[1], n));
+        const double weight = PyFloat_AsDouble(PyTuple_GetItem(given[1], n));
         if (weight == -1.0 && PyErr_Occurred()) return NULL;
-        if (!read_vector(PyTuple_GET_ITEM(member, 0), d, own)) return NULL;
+        if (!read_vector(PyTuple_GetItem(member, 0), d, own)) return NULL;
         for (Py_ssize_t i = 0; i < d; i++) x[i] = x[i] + weight * own[i];
     }
 
     PyObject *packed = PyBytes_FromStringAndSize(NULL, d * d * (Py_ssize_t)sizeof(double));
     if (packed == NULL) return NULL;
-    double *P = (double *)PyBytes_AS_STRING(packed);
+    double *P = (double *)PyBytes_AsString(packed);
     for (Py_ssize_t i = 0; i < d * d; i++) P[i] = 0.0;
     for (Py_ssize_t n = 0; n < members; n++) {
-        PyObject *member = PyList_GET_ITEM(given[0], n);
-        const double weight = PyFloat_AsDouble(PyTuple_GET_ITEM(given[1], n));
+        PyObject *member = PyList_GetItem(given[0], n);
+        const double weight = PyFloat_AsDouble(PyTuple_GetItem(given[1], n));
         const double *added;
-        if (!read_vector(PyTuple_GET_ITEM(member, 0), d, own) ||
-            !read_packed(PyTuple_GET_ITEM(member, 1), d * d, &added)) {
+        if (!read_vector(PyTuple_GetItem(member, 0), d, own) ||
+            !read_packed(PyTuple_GetItem(member, 1), d * d, &added)) {
             Py_DECREF(packed);
             return NULL;
         }
@@ -182,8 +182,8 @@ static PyObject *total_of(PyObject *module, PyObject *given) {
         return NULL;
     }
     double total = 0.0;
-    for (Py_ssize_t n = 0; n < PyList_GET_SIZE(given); n++) {
-        const double value = PyFloat_AsDouble(PyList_GET_ITEM(given, n));
+    for (Py_ssize_t n = 0; n < PyList_Size(given); n++) {
+        const double value = PyFloat_AsDouble(PyList_GetItem(given, n));
         if (value == -1.0 && PyErr_Occurred()) return NULL;
         total += value;
     }

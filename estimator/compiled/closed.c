@@ -9,6 +9,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <math.h>
+#include <string.h>
 
 #include "complex_numbers.h"
 
@@ -34,6 +35,7 @@ typedef struct {
     double point[3][COLUMNS];
     double table[ROWS][POWERS][COLUMNS];
     PyObject *quantity;           /* the named tuple of a result */
+    newfunc make;                 /* of a tuple */
 } Closed;
 
 /* --- the integrals and their derivatives by ln theta_1 and by ln f --- */
@@ -237,12 +239,12 @@ static PyObject *quantity(const Closed *self, double value, const double gradien
     for (int n = 0; n <= GRADIENT; n++) {
         PyObject *item = PyFloat_FromDouble(n ? gradient[n - 1] : value);
         if (item == NULL) { Py_DECREF(items); return NULL; }
-        PyTuple_SET_ITEM(items, n, item);
+        PyTuple_SetItem(items, n, item);
     }
     arguments = PyTuple_Pack(1, items);
     Py_DECREF(items);
     if (arguments == NULL) return NULL;
-    made = PyTuple_Type.tp_new((PyTypeObject *)self->quantity, arguments, NULL);
+    made = self->make((PyTypeObject *)self->quantity, arguments, NULL);
     Py_DECREF(arguments);
     return made;
 }
@@ -396,14 +398,18 @@ static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
         }
     }
     self->theta_1 = self->slip = NAN; /* equals nothing */
+    self->make = (newfunc)PyType_GetSlot(&PyTuple_Type, Py_tp_new);
     Py_INCREF(type);
-    Py_XSETREF(self->quantity, type);
+    Py_XDECREF(self->quantity);
+    self->quantity = type;
     return 0;
 }
 
 static void closed_dealloc(PyObject *object) {
+    PyTypeObject *type = Py_TYPE(object);
     Py_XDECREF(((Closed *)object)->quantity);
-    Py_TYPE(object)->tp_free(object);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(object);
+    Py_DECREF(type);
 }
 
 static PyMethodDef methods[] = {
@@ -411,23 +417,26 @@ static PyMethodDef methods[] = {
     {"load", (PyCFunction)(void (*)(void))load_of, METH_FASTCALL, load_doc},
     {NULL, NULL, 0, NULL}};
 
-static PyTypeObject ClosedType = {
-    PyVarObject_HEAD_INIT(NULL, 0).tp_name = "gritd.estimator.compiled.closed.Closed",
-    .tp_doc = "The closed forms of one wheel and soil.",
-    .tp_basicsize = sizeof(Closed),
-    .tp_flags = Py_TPFLAGS_DEFAULT,
-    .tp_new = PyType_GenericNew,
-    .tp_init = closed_init,
-    .tp_dealloc = closed_dealloc,
-    .tp_methods = methods};
+static PyType_Slot slots[] = {
+    {Py_tp_doc, "The closed forms of one wheel and soil."},
+    {Py_tp_new, PyType_GenericNew},
+    {Py_tp_init, closed_init},
+    {Py_tp_dealloc, closed_dealloc},
+    {Py_tp_methods, methods},
+    {0, NULL}};
+
+static PyType_Spec closed = {
+    .name = "gritd.estimator.compiled.closed.Closed",
+    .basicsize = sizeof(Closed),
+    .flags = Py_TPFLAGS_DEFAULT,
+    .slots = slots};
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "closed", .m_size = -1};
 
 PyMODINIT_FUNC PyInit_closed(void) {
-    PyObject *made;
-    if (PyType_Ready(&ClosedType) < 0) return NULL;
-    made = PyModule_Create(&module);
-    if (made == NULL) return NULL;
-    if (PyModule_AddObjectRef(made, "Closed", (PyObject *)&ClosedType) < 0) Py_CLEAR(made);
+    PyObject *made = PyModule_Create(&module), *type = PyType_FromSpec(&closed);
+    if (made == NULL || type == NULL || PyModule_AddObjectRef(made, "Closed", type) < 0)
+        Py_CLEAR(made);
+    Py_XDECREF(type);
     return made;
 }

@@ -125,10 +125,10 @@ static PyObject *noted(pile *p) {
     PyObject *heads = PyBytes_FromStringAndSize(NULL, total * LOOK);
     PyObject *cuts = PyBytes_FromStringAndSize(NULL, (p->blocks + 1) * 8);
     if (counts && starts && order && heads && cuts) {
-        p->starts = (int64_t *)PyBytes_AS_STRING(starts);
-        p->order = (int64_t *)PyBytes_AS_STRING(order);
-        p->cuts = (int64_t *)PyBytes_AS_STRING(cuts);
-        p->heads = PyBytes_AS_STRING(heads);
+        p->starts = (int64_t *)PyBytes_AsString(starts);
+        p->order = (int64_t *)PyBytes_AsString(order);
+        p->cuts = (int64_t *)PyBytes_AsString(cuts);
+        p->heads = PyBytes_AsString(heads);
         note(p, total);
         made = PyTuple_Pack(5, starts, heads, cuts, order, counts);
     }
@@ -158,11 +158,11 @@ static step *read_steps(PyObject *given, Py_ssize_t *n) {
         PyErr_SetString(PyExc_TypeError, "expected a tuple of triples");
         return NULL;
     }
-    *n = PyTuple_GET_SIZE(given);
+    *n = PyTuple_Size(given);
     step *steps = PyMem_Calloc((size_t)*n + 1, sizeof(step));
     if (steps == NULL) { PyErr_NoMemory(); return NULL; }
     for (Py_ssize_t i = 0; i < *n; i++)
-        if (!PyArg_ParseTuple(PyTuple_GET_ITEM(given, i), "nnn", &steps[i].from, &steps[i].to,
+        if (!PyArg_ParseTuple(PyTuple_GetItem(given, i), "nnn", &steps[i].from, &steps[i].to,
                               &steps[i].other)) {
             PyMem_Free(steps);
             return NULL;

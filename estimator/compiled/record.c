@@ -49,21 +49,21 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     const Py_ssize_t d = r->d;
     double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
     double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS], share[COMPONENTS];
-    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 ||
-        !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
+    if (!PyTuple_Check(line) || PyTuple_Size(line) != 5 ||
+        !PyTuple_Check(PyTuple_GetItem(line, 0))) {
         PyErr_SetString(PyExc_ValueError, "expected a line of y, H, R, D and shares");
         return 0;
     }
-    const Py_ssize_t m = PyTuple_GET_SIZE(PyTuple_GET_ITEM(line, 0));
+    const Py_ssize_t m = PyTuple_Size(PyTuple_GetItem(line, 0));
     if (m < 1 || m > COMPONENTS) {
         PyErr_SetString(PyExc_ValueError, "expected one or two components");
         return 0;
     }
-    if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 1), m, d, d, A) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 2), m, m, COMPONENTS, &R[0][0]) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &D[0][0]) ||
-        !read_vector(PyTuple_GET_ITEM(line, 4), m, share))
+    if (!read_vector(PyTuple_GetItem(line, 0), m, y) ||
+        !read_matrix(PyTuple_GetItem(line, 1), m, d, d, A) ||
+        !read_matrix(PyTuple_GetItem(line, 2), m, m, COMPONENTS, &R[0][0]) ||
+        !read_matrix(PyTuple_GetItem(line, 3), m, m, COMPONENTS, &D[0][0]) ||
+        !read_vector(PyTuple_GetItem(line, 4), m, share))
         return 0;
     for (Py_ssize_t n = 0; n < m; n++)
         D[n][n] = D[n][n] + (r->own * share[n]) * (r->own * share[n]);
@@ -82,9 +82,9 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
 
 static int read_lines(record *r, PyObject *lines, PyObject *windows) {
     for (Py_ssize_t at = 0; at < r->s; at++) {
-        const double count = PyFloat_AsDouble(PyList_GET_ITEM(windows, at));
+        const double count = PyFloat_AsDouble(PyList_GetItem(windows, at));
         if (count == -1.0 && PyErr_Occurred()) return 0;
-        if (!read_line(r, at, PyList_GET_ITEM(lines, at), count)) return 0;
+        if (!read_line(r, at, PyList_GetItem(lines, at), count)) return 0;
     }
     return 1;
 }
@@ -217,12 +217,12 @@ static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t c
     record r = {0};
     PyObject *factors = NULL, *x = NULL, *all = NULL;
     if (count != 6 || !PyTuple_Check(given[0]) || !PyList_Check(given[3]) ||
-        !PyList_Check(given[4]) || PyList_GET_SIZE(given[3]) != PyList_GET_SIZE(given[4])) {
+        !PyList_Check(given[4]) || PyList_Size(given[3]) != PyList_Size(given[4])) {
         PyErr_SetString(PyExc_TypeError, "expected an estimate, a spread, two lists of one length, and a share");
         return NULL;
     }
-    r.s = PyList_GET_SIZE(given[3]);
-    r.d = PyTuple_GET_SIZE(given[0]);
+    r.s = PyList_Size(given[3]);
+    r.d = PyTuple_Size(given[0]);
     r.own = PyFloat_AsDouble(given[5]);
     if ((r.own == -1.0 && PyErr_Occurred()) || !room(&r)) return NULL;
     double *factor = PyMem_Calloc((size_t)r.s + 1, sizeof(double));

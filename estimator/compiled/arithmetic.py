@@ -32,6 +32,12 @@ __all__ = [
     "variance",
 ]
 
+# what a user is told where it was not
+IN_PYTHON = (
+    "in Python, a tick takes three times as long: there was no compiler when gritd was installed; "
+    "expected its wheel, or gcc and another installation"
+)
+
 # the one `sum` of estimator: integers, which no order and no version of Python adds otherwise
 integer_sum: Callable[[Iterable[int]], int] = sum
 

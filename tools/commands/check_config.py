@@ -13,6 +13,7 @@ from gritd.config import packaged
 from gritd.drivers.build import build_decoder, build_link, keys_of, used_devices
 from gritd.drivers.can_signals import amiss_elsewhere
 from gritd.drivers.errors import DeviceSettingsError
+from gritd.estimator.compiled import arithmetic
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.channels import UNITS
 from gritd.estimator.config.json_schema import json_schema
@@ -103,7 +104,11 @@ def check_devices(settings: Settings) -> None:
 
 
 def notes(settings: Settings) -> Iterator[str]:
-    """What is wrong in a CAN database with messages that nobody listens to."""
+    """What makes this installation slow, and what is wrong in a CAN database with messages that
+    nobody listens to.
+    """
+    if not arithmetic.BUILT:
+        yield f"note: arithmetic {arithmetic.IN_PYTHON}"
     for device in used_devices(settings):
         if wrong := amiss_elsewhere(device, keys_of(settings, device)):
             yield f"note: {wrong}"

@@ -134,6 +134,8 @@ def summary(report: Report) -> Iterator[str]:
         f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
         f"{report['real_time']}"
     )
+    if (arithmetic := report.get("arithmetic", "compiled")) != "compiled":
+        yield f"  compute  {arithmetic}"
     if notice := report.get("wall_clock"):
         yield f"  clock    {notice}"
 

@@ -15,6 +15,7 @@ from typing import Any
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader
 from gritd.drivers.sensor import Sensor
+from gritd.estimator.compiled import arithmetic
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
@@ -49,6 +50,7 @@ class Reporter:
             "hanging": daemon.health,
             "unfed": daemon.feed.unfed,
             "real_time": self._notice or "yes",
+            "arithmetic": "compiled" if arithmetic.BUILT else arithmetic.IN_PYTHON,
             "wall_clock": daemon.clock.notice,
             "configuration": daemon.configuration.source,
             "setup": setup(daemon.configuration.settings, daemon.run.name),

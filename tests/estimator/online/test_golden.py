@@ -32,6 +32,23 @@ def test_they_hold_a_change_of_the_soil():
     assert any(flag & Flag.CHANGED for flag in flags)
 
 
+VERIFY = """
+import sys
+if sys.argv.pop(1) == "in Python":
+    sys.modules.update({f"gritd.estimator.compiled.{name}": None for name in ("algebra", "closed")})
+from gritd.tools.main import main
+sys.exit(main(["replay", "--verify", *sys.argv[1:]]))
+"""
+
+
+@pytest.mark.parametrize("arithmetic", ["compiled", "in Python"])
+def test_every_python_verifies_the_recording_bit_for_bit(arithmetic):
+    """CI does so with each version."""
+    command = [sys.executable, "-c", VERIFY, arithmetic, str(golden.RECORDED)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, f"{done.stdout}{done.stderr}{ANEW}"
+
+
 HASHED = """
 import hashlib, numpy
 from gritd.estimator.online.pipeline import Pipeline

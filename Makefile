@@ -59,9 +59,10 @@ man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
 
 site: $(READY) ## build/site: the documents as a site, to open from the folder; its examples run, a minute or two
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
-	@rm -rf docs/site/commands build/site
-	@$(BIN)/python -m gritd.tools.dev.manual --site docs/site/commands
-	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
+	@rm -rf build/pages build/site && mkdir -p build/pages && cp -r docs config CHANGELOG.md build/pages
+	@$(BIN)/python -m gritd.tools.dev.manual --site build/pages/docs/site/commands
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going \
+	  -c build/pages/docs/site -d build/doctrees build/pages/docs build/site
 	@echo "build/site/index.html"
 
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes docs/real-recordings.md

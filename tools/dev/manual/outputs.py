@@ -25,6 +25,7 @@ Printed = list[str]  # what each line of an example printed, in their order
 
 def outputs(examples: Mapping[str, Example] = EXAMPLES) -> dict[str, Printed]:
     """Command → what its example printed. Raises RuntimeError where one fails."""
+    examples = {name: example for name, example in examples.items() if not example.shown}
     printed = {}
     with TemporaryDirectory() as folder, Progress("examples", len(examples)) as progress:
         for name, text in _each(examples, Path(folder)):
@@ -35,7 +36,7 @@ def outputs(examples: Mapping[str, Example] = EXAMPLES) -> dict[str, Printed]:
 
 def _each(examples: Mapping[str, Example], folder: Path) -> Iterator[tuple[str, Printed]]:
     for name, example in examples.items():
-        if example.shown or example.during_demo:
+        if example.during_demo:
             continue
 
         if example.before:
@@ -67,16 +68,18 @@ def _started(line: str, folder: Path) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # also below `make … &`
     )
 
 
 def _ended(process: subprocess.Popen[str], example: Example = PLAIN) -> str:
     """What it printed on standard output."""
-    try:
-        out, err = process.communicate(timeout=example.seconds)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate()
+    while True:
+        try:
+            out, err = process.communicate(timeout=example.seconds)
+            break
+        except subprocess.TimeoutExpired:  # again, where it was not ready for the first
+            os.killpg(process.pid, signal.SIGINT)
 
     if process.returncode not in (0, example.code):
         raise RuntimeError(f"{process.args!r}: exit code {process.returncode}: {err}")

@@ -2,7 +2,7 @@
 
 It knows nothing of recordings, channels or SI: milliseconds, revolutions per minute, millimetres,
 and a load cell that pushes upward. The wheel is simulated by Eqs. (1)-(10) in a soil that the
-configuration does not know, with a Coulomb friction in the drive that nobody has told gritd of.
+configuration does not know, with a Coulomb friction in the drive that gritd does not know of.
 """
 
 from pathlib import Path

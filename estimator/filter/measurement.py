@@ -45,7 +45,7 @@ from gritd.estimator.wheel.wheel_state import WheelState, wheel_state, wheeling
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
-Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
+ByParameters = tuple[tuple[float, float], ...]  # ∂(T, DP) by each uncertain effect parameter
 
 
 class Shared(NamedTuple):
@@ -114,32 +114,28 @@ class Measurement:
         return slice(first, first + directions_of(self.settings))
 
     def state(
-        self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns
+        self, snapshot: Snapshot, context: Context, estimate: Estimate, known: ByParameters
     ) -> WheelState:
-        """The window in the wheel's own terms, effects accounted for; columns: those of the last
-        update.
+        """The window in the wheel's own terms, effects accounted for; known: the derivatives by the
+        effects' parameters, of the last update.
         """
         now = self._sensed(self.model, self.chain, snapshot, context, estimate)
-        columns = columns or self._unmoved
-        return now if columns == now.columns else now._replace(columns=columns)
+        return now._replace(by_parameters=known or self._unmoved) if self._variants else now
 
-    def with_columns(
+    def by_parameters(
         self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate
-    ) -> WheelState:
-        """The window with the change of its innovation for one σ of each uncertain effect
-        parameter, and of n.
-        """
+    ) -> ByParameters:
+        """How predicted (T, DP) change with one σ of each uncertain effect parameter."""
         if not self._variants:
-            return now
+            return ()
 
         here = _innovation(now, self.predict(estimate, now))
-        columns = []
+        changes = []
         for model, chain in self._variants:
             moved = self._sensed(model, chain, snapshot, context, estimate)
             there = _innovation(moved, self._predicted(model, estimate, moved))
-            columns.append((here[0] - there[0], here[1] - there[1]))
-
-        return now._replace(columns=tuple(columns))
+            changes.append((here[0] - there[0], here[1] - there[1]))
+        return tuple(changes)
 
     def predict(self, estimate: Estimate, now: WheelState) -> ForcePrediction:
         """T, DP and resistance of the equations at the estimate, in this window's geometry."""
@@ -223,7 +219,7 @@ class Measurement:
         """Of T and DP (q,) each: by the calibration, the effects' parameters, the learnt
         discrepancy, and the error of form.
         """
-        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *now.columns]
+        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *now.by_parameters]
         if now.form is not None:
             columns += [_felt(column, s) for column in now.form.columns]
 

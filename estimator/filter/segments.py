@@ -96,8 +96,9 @@ class Stretch(NamedTuple):
             added=old.added and now.added and Added(*_blend(old.added, now.added, weight)),
             here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
             form=old.form and now.form and old.form.mixed(now.form, weight),
-            columns=tuple(
-                _blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)
+            by_parameters=tuple(
+                _blend(a, b, weight)
+                for a, b in zip(old.by_parameters, now.by_parameters, strict=True)
             ),
         )
         return self._replace(

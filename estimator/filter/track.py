@@ -8,7 +8,7 @@ from typing import NamedTuple
 from gritd.estimator.filter.bank import Bank
 from gritd.estimator.filter.estimate import Estimate, Vector
 from gritd.estimator.filter.line import Line
-from gritd.estimator.filter.measurement import Columns
+from gritd.estimator.filter.measurement import ByParameters
 from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.trust import Trust
 from gritd.estimator.messages.replacing import quickly_replaced
@@ -77,7 +77,7 @@ class TrackState(NamedTuple):
     window: int  # [ns] length of a window
     choosing: bool  # whether that is one from which another length is to be chosen
     recall: Mapping[str, Recall]  # what configured effects remember, by name
-    columns: Columns = ()  # of the uncertain effect parameters, at the last update
+    by_parameters: ByParameters = ()  # ∂(T, DP) by uncertain effect parameters, at the last update
     linearised: Vector | None = None  # where the memory was linearised last
     unlinearised: int = 0  # windows since then
     began: int = -1  # end of the first window [ns]

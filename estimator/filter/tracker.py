@@ -125,7 +125,7 @@ class Tracker:
             state = self.reviewed(state) if closes else self._concluded(self.reviewer.step(state))
 
         context = _context(state, snapshot, elapsed)
-        now = self.measurement.state(snapshot, context, state.estimate, state.columns)
+        now = self.measurement.state(snapshot, context, state.estimate, state.by_parameters)
         started = state.started
         aids: tuple[Aid, ...] = ()
         if closes and snapshot.ready:
@@ -135,7 +135,8 @@ class Tracker:
 
         status = classify(self.settings, snapshot, now, state.steady, self._required, started)
         if closes and status == Status.TRACKING and not state.choosing:
-            now = self.measurement.with_columns(now, snapshot, context, state.estimate)
+            known = self.measurement.by_parameters(now, snapshot, context, state.estimate)
+            now = now._replace(by_parameters=known)
             state, aids = self._update(state, now, elapsed)
 
         account = self._account(state, snapshot, now, status, aids)
@@ -276,7 +277,7 @@ class Tracker:
             estimate=estimate,
             base=base,
             bank=bank,
-            columns=now.columns,
+            by_parameters=now.by_parameters,
             memory=memory,
             unlinearised=state.unlinearised + 1,
             trust=trust

@@ -76,9 +76,8 @@ class WheelState(NamedTuple):
     added: Added | None = None  # what wheel and testbed effects add to the closed forms
     # the soil under this window from the estimated one; None where it is the same
     here: Here | None = None
-    columns: tuple[
-        tuple[float, float], ...
-    ] = ()  # change of predicted (T, DP) with each uncertain effect parameter
+    # ∂(T, DP) by each uncertain effect parameter, in its σ
+    by_parameters: tuple[tuple[float, float], ...] = ()
     situation: Situation | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
     grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`
@@ -88,19 +87,22 @@ class WheelState(NamedTuple):
 
 
 def wheel_state(
-    settings: Settings,
-    snapshot: Snapshot,
-    chain: Chain | None = None,
-    context: Context | None = None,
+    settings: Settings, snapshot: Snapshot, chain: Chain, context: Context
 ) -> WheelState:
     """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain and the learnt
     discrepancy accounted for.
     """
-    now = _with_effects(settings, snapshot, chain, context)
-    if chain is None or context is None or chain.form is None or not snapshot.ready:
-        return now
+    if not snapshot.ready:
+        return _as_read(settings, snapshot)
 
-    return _with_form(now, snapshot.wheel_angle, chain.wheel, chain.form, context)
+    if chain.acting:
+        now = _without_effects(settings, snapshot, chain, context)
+    else:
+        now = _as_read(settings, snapshot)
+
+    if chain.form is None:
+        return now
+    return _without_form(now, snapshot.wheel_angle, chain.wheel, chain.form, context)
 
 
 def wheeling(now: WheelState, wheel_angle: float) -> Wheeling:
@@ -110,7 +112,7 @@ def wheeling(now: WheelState, wheel_angle: float) -> Wheeling:
     )
 
 
-def _with_form(
+def _without_form(
     now: WheelState, wheel_angle: float, wheel: Wheel, form: FormOnLine, context: Context
 ) -> WheelState:
     """The sinkage that the equations would give, and θ₁ of it: the measured one less δ's mean."""
@@ -121,12 +123,10 @@ def _with_form(
     return now._replace(sinkage=sinkage, theta_1=angle, theta_m=theta_m, form=here)
 
 
-def _with_effects(
-    settings: Settings, snapshot: Snapshot, chain: Chain | None, context: Context | None
+def _without_effects(
+    settings: Settings, snapshot: Snapshot, chain: Chain, context: Context
 ) -> WheelState:
-    if chain is None or context is None or not chain.acting or not snapshot.ready:
-        return _plain(settings, snapshot)
-
+    """The window once `Chain.undo` has taken out what effects do to it."""
     undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
     true = snapshot._replace(
         wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
@@ -134,7 +134,7 @@ def _with_effects(
         sinkage=snapshot.sinkage._replace(value=undone.sinkage),
         drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
     )
-    now = _plain(replace(settings, wheel=chain.wheel), true)
+    now = _as_read(replace(settings, wheel=chain.wheel), true)
 
     return now._replace(
         torque=now.torque._replace(value=undone.torque),
@@ -158,7 +158,8 @@ def _doubted(measured: Measured, value: float, doubt: float) -> Measured:
     )
 
 
-def _plain(settings: Settings, snapshot: Snapshot) -> WheelState:
+def _as_read(settings: Settings, snapshot: Snapshot) -> WheelState:
+    """The window as the calibrated sensors have it."""
     radius = settings.wheel.radius
     rim = Measured(snapshot.wheel_speed.value * radius, snapshot.wheel_speed.sigma * radius)
     travel = snapshot.carriage_speed

@@ -32,7 +32,7 @@ __all__ = [
     "variance",
 ]
 
-# what a user is told where it was not
+# what a user reads where it was not
 IN_PYTHON = (
     "in Python, a tick takes three times as long: there was no compiler when gritd was installed; "
     "expected its wheel, or gcc and another installation"

@@ -90,6 +90,18 @@ def test_the_files_of_an_installation(tmp_path):
     assert below(tmp_path) == {"etc/gritd/config.yaml", "etc/gritd/testbed.dbc"}
 
 
+def test_a_distribution_has_its_own_places(tmp_path):
+    """PREFIX=/usr: only the configuration is outside /usr; the units name what is there."""
+    install("files", tmp_path, PREFIX="/usr")
+    outside = {path for path in below(tmp_path) if not path.startswith("usr/")}
+    assert outside == {"etc/gritd/config.yaml", "etc/gritd/testbed.dbc"}
+    for name in (UNIT.name, VIEW.name):
+        unit = (tmp_path / "usr/lib/systemd/system" / name).read_text()
+        assert "ExecStart=/usr/lib/gritd/bin/gritd " in unit and "/opt/" not in unit
+        page = re.search(r"^Documentation=file:/(\S+)", unit, re.MULTILINE).group(1)
+        assert (tmp_path / page).is_file()
+
+
 @pytest.mark.parametrize(
     "home, warned", [("root/.pyenv", True), ("home/eva", True), ("usr", False)]
 )
@@ -123,8 +135,8 @@ def test_crash_after_crash_backs_off(tmp_path, monkeypatch, figure):
     assert took[7] > 4.0
 
 
-def install(command, root):
-    environment = {"DESTDIR": str(root), "PATH": "/usr/bin:/bin"}
+def install(command, root, **more):
+    environment = {"DESTDIR": str(root), "PATH": "/usr/bin:/bin", **more}
     script = str(ROOT / "tools" / "install")
     return subprocess.run(
         [script, command], env=environment, capture_output=True, text=True, check=True

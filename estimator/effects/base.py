@@ -122,7 +122,7 @@ class Fingerprint(NamedTuple):
 
 
 def told_apart(**by: str) -> Mapping[str, str]:
-    """Other effects that look alike, each with the key of EXPERIMENTS that tells them apart."""
+    """Other effects that look alike, each with the key of EXPERIMENTS that distinguishes them."""
     return by
 
 

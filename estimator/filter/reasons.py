@@ -78,7 +78,7 @@ def _at_bound(tracker: Tracker, estimate: Estimate) -> str:
     ]
     at = max(tracker.at_bound(estimate), key=apart.__getitem__, default=0)
     shown = (f"{x[0] * KPA:.0f} Pa", f"{x[1]:.3f}", f"{exp(x[LN_K]) * 1e3:.1f} mm")[at]
-    return f"{NAMES[at]} stands at its bound, {shown}, {apart[at]:.1f} σ from its prior"
+    return f"{NAMES[at]} is at its bound, {shown}, {apart[at]:.1f} σ from its prior"
 
 
 def _misfit(tracker: Tracker, state: TrackState) -> str:

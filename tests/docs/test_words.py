@@ -19,7 +19,7 @@ OUT = {
     r"held for its (own )?stretch": "fitted within one segment",
     r"louder than stated": "noise exceeds the stated σ",
     r"along no condition": "uncorrelated with any covariate",
-    r"(told|tells?|telling) apart": "distinguished",
+    r"(told|tells?|telling)( \w+)? apart": "distinguished",
     r"(is|are|was|were|be|been) told": "reported",
 }
 PATTERNS = {

@@ -100,4 +100,4 @@ def honesty(consistency: float | None) -> str:
         return "model disagrees"
     if consistency > TOO_LARGE:
         return "σ too small"
-    return "σ as it should be" if consistency > TOO_SMALL else "σ on the safe side"
+    return "σ consistent" if consistency > TOO_SMALL else "σ conservative"

@@ -60,7 +60,7 @@ def page(effect: type[Effect]) -> Iterator[str]:
 
     if alike := looks_like(effect.name):
         yield ""
-        yield "looks like, and what tells them apart"
+        yield "looks like, and what distinguishes them"
         yield from (f"  {other:26}{EXPERIMENTS[key]}" for other, key in alike.items())
 
 

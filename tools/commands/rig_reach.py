@@ -20,7 +20,7 @@ def reach(settings: Settings) -> str:
     load = "a measured load" if wrench is not None else "a stated load"
     measured = " and ".join(part for part in (torque, pull) if part)
 
-    found = "c, tan φ and k from two loads and three slips; at one load their sum"
+    found = "c, tan φ and k from two loads and three slips; at one load only their joint effect"
     if not (torque and pull):
         found += "; the place of the stress peak has to be stated for a narrow σ"
     return f"{measured} under {load}: {found}"

@@ -278,7 +278,7 @@ def _menu() -> str:
     return "\n".join([MENU, *(f"- `{k}`: {v}" for k, v in EXPERIMENTS.items())])
 
 
-MENU = """## Experiments that tell effects apart
+MENU = """## Experiments that distinguish effects
 
 Simulated for every pair named above (`tests/estimator/effects/test_separation.py`): the soil within
 its prior and the other effect are fitted to what the effect changes, on a campaign without the

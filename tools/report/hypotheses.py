@@ -145,7 +145,7 @@ def _separation(group: Sequence[Hypothesis]) -> Child:
 
     items = (tag("li", f"{'; '.join(pairs)}: {how}") for how, pairs in ways.items())
     return (
-        (tag("p", "What would tell them apart:", class_="note"), tag("ul", items, class_="note"))
+        (tag("p", "What would distinguish them:", class_="note"), tag("ul", items, class_="note"))
         if ways
         else None
     )

@@ -10,8 +10,8 @@ from gritd.tools.cli.wording import honesty
 @pytest.mark.parametrize(
     ("consistency", "words"),
     [
-        (0.1, "σ on the safe side"),
-        (1.0, "σ as it should be"),
+        (0.1, "σ conservative"),
+        (1.0, "σ consistent"),
         (3.0, "σ too small"),
         (30.0, "model disagrees"),
         (float("nan"), "no innovations yet"),

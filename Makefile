@@ -20,6 +20,7 @@ $(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
 	  { echo "gritd needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "setting up $(VENV) (a minute or two, once) …"
 	@$(PYTHON) -m venv --upgrade $(VENV) || { echo "cannot make a venv; is the package python3-venv installed?" >&2; exit 1; }
+	@rm -f estimator/compiled/*.cpython-*.so  # of versions before the limited API; Python would take them first
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[test]'
 	@ls estimator/compiled/*.so >/dev/null 2>&1 || \
 	  echo "nothing was compiled, and a tick takes longer; for Debian's Python: apt install gcc python3-dev; rm $@" >&2
@@ -58,6 +59,7 @@ man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
 	@$(BIN)/python -m gritd.tools.dev.manual build/man
 
 site: $(READY) ## build/site: the documents as a site, to open from the folder; its examples run, a minute or two
+	@rm -f estimator/compiled/*.cpython-*.so  # of versions before the limited API; Python would take them first
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
 	@rm -rf build/pages build/site && mkdir -p build/pages && cp -r docs config CHANGELOG.md build/pages
 	@$(BIN)/python -m gritd.tools.dev.manual --site build/pages/docs/site/commands

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from gritd.estimator.visible import writable
 
@@ -49,8 +51,21 @@ def changed_versions(then: Mapping[str, str]) -> list[str]:
 @cache
 def versions() -> Mapping[str, str]:
     """What computed this run: a replay that differs can say what changed."""
-    installed = {"python": platform.python_version(), "machine": platform.machine()}
+    installed = {"python": platform.python_version(), "machine": _machine()}
     for package in ("gritd", "numpy", "filterpy", "scipy"):
         with suppress(PackageNotFoundError):
             installed[package] = version(package)
     return installed
+
+
+def _machine() -> str:
+    """The kind of processor, and the C library whose sin, cos, exp and log are used. Without FMA,
+    those of glibc on x86-64 give other last digits than with it, or than on aarch64.
+    """
+    machine, libc = platform.machine(), ""
+    with suppress(OSError):
+        flags = Path("/proc/cpuinfo").read_text("utf-8").partition("flags")[2].partition("\n")[0]
+        machine += " without FMA" * bool(flags and "fma" not in flags.split())
+    with suppress(ValueError, OSError):  # no glibc
+        libc = os.confstr("CS_GNU_LIBC_VERSION") or ""
+    return f"{machine}, {libc}" if libc else machine

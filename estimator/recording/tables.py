@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.compiled import records
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.recording.cdr import BILLION, TIME, Codec, Rows, Topic
 from gritd.estimator.recording.decoding import MessageHeads, RecordedChannel
 from gritd.estimator.recording.message_records import MESSAGE_HEAD, Starts, gather
@@ -164,7 +165,7 @@ class Tables:
             return
         topics = {s.topic.name: s.topic for s in sources.values() if s.codec and s.topic.codec.flat}
         sizes = (self.expected[n] * Table(t, None).dtype.itemsize for n, t in topics.items())
-        if sum(sizes) <= ROOM:
+        if integer_sum(sizes) <= ROOM:
             self.wanted = dict.fromkeys(topics)
 
     def add(self, chunk: MessageHeads, sources: Mapping[int, RecordedChannel], before: int) -> None:

@@ -27,6 +27,8 @@ myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
 myst_links_external_new_tab = True
 
+default_role = "code"  # of docstrings
+autodoc_type_aliases = {name: name for name in ("Place", "Series", "Table")}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 
@@ -55,5 +57,13 @@ def parameters_as_fields(*event: Any) -> None:
     lines[:] = [re.sub(r"^(\w+): ", r":param \1: ", line) for line in lines]
 
 
+def aliases_by_name(*event: Any) -> tuple[str | None, ...]:
+    """Arguments and result of a function, with an alias of a type by its name alone."""
+    return tuple(
+        text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in event[-2:]
+    )
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("autodoc-process-signature", aliases_by_name)
     app.connect("autodoc-process-docstring", parameters_as_fields)

@@ -16,7 +16,9 @@ from gritd.tools.dev.manual.roff import man_pages
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m gritd.tools.dev.manual", description=__doc__)
     parser.add_argument("folder", type=Path, metavar="DIR")
-    parser.add_argument("--site", action="store_true", help="Markdown; runs the examples, a minute")
+    parser.add_argument(
+        "--site", action="store_true", help="Markdown; runs the examples, some minutes"
+    )
     given = parser.parse_args()
 
     files = reference(pages(), outputs()) if given.site else man_pages(pages())

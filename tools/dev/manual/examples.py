@@ -53,7 +53,7 @@ EXAMPLES = {
     ),
     "effects": Example(("gritd effects bulldozing",)),
     "bed": Example(("gritd bed --directory runs new sand-may", "gritd bed --directory runs")),
-    "demo": Example(("gritd demo --seconds 12",)),
+    "demo": Example(("gritd demo",), code=1),
     "reproduce": Example(("gritd reproduce --simulations 2000",)),
     "calibrate": Example(
         (

@@ -15,7 +15,7 @@ from gritd.tools.cli.progress import Progress
 from gritd.tools.dev.manual.examples import EXAMPLES, Example
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-RUNNING = 9.0  # [s] after which the demo has something to show
+RUNNING = 45.0  # [s] after which the demo has something to show
 COLUMNS = "100"
 
 PLAIN = Example(())
@@ -55,7 +55,7 @@ def _demo(examples: Mapping[str, Example], folder: Path) -> Iterator[tuple[str, 
     for name, example in examples.items():
         if example.during_demo:
             yield name, [_ended(_started(line, folder)) for line in example.lines]
-    yield "demo", [_ended(demo)]
+    yield "demo", [_ended(demo, examples["demo"])]
 
 
 def _started(line: str, folder: Path) -> subprocess.Popen[str]:

@@ -61,8 +61,8 @@ man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
 site: $(READY) ## build/site: the documents as a site, to open from the folder; its examples run, some minutes
 	@rm -f estimator/compiled/*.cpython-*.so  # of versions before the limited API; Python would take them first
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
-	@rm -rf build/pages build/site && mkdir -p build/pages && cp -r docs build/pages
-	@ln -s $(addprefix $(CURDIR)/,.github config drivers estimator tools $(wildcard *.md)) build/pages # links lead there
+	@rm -rf build/pages build/site && mkdir -p build/pages
+	@cp -r docs .github config drivers estimator tools *.md build/pages  # links of docs/ lead to the others
 	@$(BIN)/python -m gritd.tools.dev.manual --site build/pages/docs/site/commands
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going \
 	  -c build/pages/docs/site -d build/doctrees build/pages/docs build/site

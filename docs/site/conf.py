@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.util.inspect import TypeAliasForwardRef
 
 from gritd import __version__
 
@@ -29,6 +30,7 @@ myst_links_external_new_tab = True
 
 default_role = "code"  # of docstrings
 autodoc_type_aliases = {name: name for name in ("Place", "Series", "Table")}
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 
@@ -57,13 +59,5 @@ def parameters_as_fields(*event: Any) -> None:
     lines[:] = [re.sub(r"^(\w+): ", r":param \1: ", line) for line in lines]
 
 
-def aliases_by_name(*event: Any) -> tuple[str | None, ...]:
-    """Arguments and result of a function, with an alias of a type by its name alone."""
-    return tuple(
-        text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in event[-2:]
-    )
-
-
 def setup(app: Sphinx) -> None:
-    app.connect("autodoc-process-signature", aliases_by_name)
     app.connect("autodoc-process-docstring", parameters_as_fields)

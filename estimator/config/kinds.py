@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gritd.estimator.config import units
-from gritd.estimator.config.nearest import did_you_mean, listed
+from gritd.estimator.config.nearest import KEYS_ALIKE, did_you_mean, listed
 from gritd.estimator.config.yamltree import Node, Scalar, YamlSequence, describe, shown
 
 UNLIMITED = "unlimited"
@@ -201,7 +201,9 @@ class Choice:
     def read(self, node: Node) -> tuple[str, Node]:
         text = scalar(node, self.expected)
         if text not in self.words:
-            raise node.place.error(describe(node) + did_you_mean(text, self.words), self.expected)
+            raise node.place.error(
+                describe(node) + did_you_mean(text, self.words, KEYS_ALIKE), self.expected
+            )
         return text, node
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from gritd.estimator.config import units
 from gritd.estimator.config.kinds import WHOLE, Choice, Kind, NumberWithUnit
-from gritd.estimator.config.nearest import did_you_mean
+from gritd.estimator.config.nearest import KEYS_ALIKE, did_you_mean
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.config.yamltree import (
     FilePosition,
@@ -188,7 +188,7 @@ def entries(node: Node, expected: str, known: Iterable[str] | None = None) -> di
     names = list(known or node.items)
     for name, item in node.items.items():
         if name not in names:
-            options = did_you_mean(name, names) or f" (known here: {', '.join(names)})"
+            options = did_you_mean(name, names, KEYS_ALIKE) or f" (known here: {', '.join(names)})"
             raise item.place.error("an unknown key", f"a known one{options}")
     return node.items
 

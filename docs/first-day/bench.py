@@ -11,7 +11,7 @@ import numpy as np
 from gritd.config import packaged
 from gritd.estimator.config.configuration import load
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.importers.recording import Stream, stamps, write
+from gritd.tools.importers.recording import ChannelReadings, stamps, write
 
 RATE = 100.0  # [Hz]
 STAY, MOVE = 3.5, 0.5  # [s] at a value, and from one to the next
@@ -31,7 +31,7 @@ def record(name: str, channel: str, values: list[float], scale: float, offset: f
     """physical = volts · scale + offset, with 2 mV of noise."""
     time, physical = staircase(values)
     noise = np.random.default_rng(SEED).normal(0.0, 2e-3, time.size)
-    stream = Stream(channel, stamps(START, time), (physical - offset) / scale + noise)
+    stream = ChannelReadings(channel, stamps(START, time), (physical - offset) / scale + noise)
     write(Path(name), [stream], load(packaged()), RunInfo(name=channel))
 
 

@@ -23,6 +23,7 @@ PAGES = ("pyproject.toml", "README.md", "LICENSE")
 OF_THE_CHECKOUT = {  # scripts and what they install
     "gritd/config/release.lock",
     "gritd/config/requirements.lock",
+    "gritd/tools/aarch64",
     "gritd/tools/install",
     "gritd/tools/lock",
     "gritd/tools/release",

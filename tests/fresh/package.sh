@@ -31,7 +31,7 @@ same "$(config)" mine
 gritd --version
 
 # Removed: the configuration and the recordings stay; installed again, they are found.
-timed "apt remove" apt-get remove -y -qq gritd
+timed "apt remove" sh -c 'apt-get remove -y -qq gritd >/dev/null'
 same "$(ls -d /usr/lib/gritd /usr/bin/gritd /usr/lib/systemd/system/gritd.service 2>/dev/null)" ""
 same "$(config)" mine
 ls /var/lib/gritd/*.mcap
@@ -39,6 +39,6 @@ timed "install again" packages "$one"
 same "$(config)" mine
 
 # Purged: the recordings alone stay.
-apt-get purge -y -qq gritd
+apt-get purge -y -qq gritd >/dev/null
 same "$(find / -xdev -path /root -prune -o -path /tmp -prune -o -name '*gritd*' -print)" /var/lib/gritd
 ls /var/lib/gritd/*.mcap

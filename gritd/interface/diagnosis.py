@@ -83,7 +83,8 @@ def diagnose(
 
     runs: recordings or their files. config: the testbed and what is known of the soil.
     reference: recordings of the same rig with nothing new; then what is named is what is new.
-    bed: with a reference, "same" or "prepared". seed: of the surrogates. jobs: processes that fit.
+    bed: with a reference, "same" or "prepared". jobs: processes that fit.
+    seed: of earlier versions; nothing is drawn any more.
     quick: a first answer, for which only the likeliest effects are fitted, each alone.
     other_rig: config may be of another testbed than the runs.
     online: the on-line filter runs over them too, by config and by what was found.

@@ -125,7 +125,7 @@ def compare(
 
     configured = np.zeros(len(rig.constants))
     if fitted:
-        base = fit_base(rig, np.random.default_rng(0))
+        base = fit_base(rig)
         fit, noise = base.fitted, base.problem.noise
     else:
         fit, noise = None, first_guess(stack, stack.predict(configured))

@@ -204,9 +204,8 @@ def run_case(case: FitCase) -> FitOutcome:
         warnings.simplefilter("ignore", RuntimeWarning)
         try:
             rig = _recorded(case.folder) if case.folder else _drawn(rng)
-            noise = np.random.default_rng(0)
             rig, _ = accustomed(rig)
-            search = search_models(prepare_screening(fit_base(rig, noise), noise))
+            search = search_models(prepare_screening(fit_base(rig)))
             return FitOutcome(case.name, tuple(compared(name, search, case.starts, rng)))
         except CommandError as error:
             return FitOutcome(case.name, (), str(error))

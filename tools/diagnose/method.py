@@ -6,7 +6,7 @@
     reference    what it shows by itself, the steps below for it alone   verdict/anyway.py
     noise        size and colour of each channel, from the recordings    noise/estimate.py
     fit          soil and calibration within what is known of them       fit/base.py
-    screen       evidence of every effect, and of misfits without name   screen/screening.py
+    screen       one pass: the evidence of every effect, and an alarm    screen/screening.py
     search       nonlinear fits, one more effect at a time               search/search.py
     verdict      probabilities, groups, "unlisted"                       verdict/decide.py
     explanation  where, how sure, how much better, what to do next       explain/explanation.py
@@ -20,8 +20,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
-
-import numpy as np
 
 from gritd.tools.cli.memory import give_back
 from gritd.tools.diagnose.explain.explanation import explain
@@ -50,16 +48,17 @@ def diagnose(
     jobs: int = 1,
     quick: bool = False,
 ) -> Diagnosis:
-    """Everything `gritd diagnose` says of a rig's recordings. Deterministic for a seed.
+    """Everything `gritd diagnose` says of a rig's recordings. Nothing is drawn: the same recordings
+    give the same result.
 
-    redo: kept in the result; step: is told what begins; jobs: processes that fit; quick: a first
-    answer, for which only the likeliest effects are fitted, each alone.
+    seed, redo: kept in the result; step: is told what begins; jobs: processes that fit; quick: a
+    first answer, for which only the likeliest effects are fitted, each alone.
     """
     kept = {**(redo or {}), "seed": seed}
     if quick:  # what the reference shows by itself takes a search of its own
         with first_answer():
-            return _diagnose(rig, None, seed, kept, step, jobs)
-    return _diagnose(*accustomed(rig, seed, step, jobs), seed, kept, step, jobs)
+            return _diagnose(rig, None, kept, step, jobs)
+    return _diagnose(*accustomed(rig, step, jobs), kept, step, jobs)
 
 
 @contextmanager
@@ -73,13 +72,12 @@ def first_answer() -> Iterator[None]:
 def _diagnose(
     rig: Rig,
     of_reference: Verdict | None,
-    seed: int,
     redo: Mapping[str, Any],
     step: Callable[[str], None],
     jobs: int,
 ) -> Diagnosis:
     step("fitting the soil and the noise")
-    search = _searched(rig, seed, step, jobs)
+    search = _searched(rig, step, jobs)
     decision = decide(search, jobs, step)
 
     step("holding out runs and conditions")
@@ -88,7 +86,7 @@ def _diagnose(
 
 
 def accustomed(
-    rig: Rig, seed: int = 0, step: Callable[[str], None] = lambda _: None, jobs: int = 1
+    rig: Rig, step: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> tuple[Rig, Verdict | None]:
     """The rig with what its reference shows by itself in both campaigns, and the verdict on that; a
     rig without a reference as it is.
@@ -101,18 +99,17 @@ def accustomed(
         step(f"{OF_REFERENCE}{what}")
 
     said("fitting the soil and the noise")
-    decision = decide(_searched(alone, seed, said, jobs), jobs, said)
+    decision = decide(_searched(alone, said, jobs), jobs, said)
     return rig.having(had_anyway(alone, decision)), decision.verdict
 
 
-def _searched(rig: Rig, seed: int, step: Callable[[str], None], jobs: int) -> Search:
-    rng = np.random.default_rng(seed)
-    base = fit_base(rig, rng, jobs)
+def _searched(rig: Rig, step: Callable[[str], None], jobs: int) -> Search:
+    base = fit_base(rig, jobs)
     give_back()
-    return search_models(prepare_screening(base, rng), step, jobs)
+    return search_models(prepare_screening(base), step, jobs)
 
 
-def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:
+def fit_base(rig: Rig, jobs: int = 1) -> BaseFit:
     """The base model in noise of the recordings' own size and colour.
 
     Fitted roughly first, in white noise: what is left when everything is explained away is noise.
@@ -125,8 +122,6 @@ def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:
     rough = fit_roughly(stack)
 
     if stack.referred:
-        return fit_beside_reference(rough, rng)
-    noise = estimate(
-        stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng, jobs
-    )
+        return fit_beside_reference(rough)
+    noise = estimate(stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, jobs)
     return refit(rough, noise)

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from gritd.estimator.effects import make
@@ -15,7 +14,8 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.screen.screening import prepare_screening, screen_of_base
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -61,35 +61,29 @@ def test_what_is_new_is_named_alone() -> None:
     assert {place.channel for place in found.location} == {"torque"}
 
 
-def _rng() -> np.random.Generator:
-    return np.random.default_rng(1)
-
-
-def test_the_reference_tells_what_its_single_runs_show() -> None:
-    """What a run of the reference shows counts from where NEW is surprising."""
-    base = fit_base(rig_of(HABITS, (NEW,)), np.random.default_rng(0))
-    screen = screen_of_base(prepare_screening(base, _rng()))
-    loud = max(screen.evidence, key=lambda of: screen.evidence[of])
-    raised = screen.beside_reference({loud: screen.evidence[loud]}, screen.asked)
-    assert raised.surprise(loud) < 0.0 < screen.surprise(loud)
+def test_the_runs_of_the_reference_show_what_is_usual() -> None:
+    """News must be more than each of them would raise if it were new."""
+    screen = begin(prepare_screening(fit_base(rig_of(HABITS, (NEW,))))).first
+    assert screen.alarmed and screen.ratio > screen.threshold > screen.usual >= 0.0
+    assert not replace(screen, usual=screen.ratio).alarmed
 
 
 def test_friction_that_is_new_is_not_taken_for_one_that_the_reference_hides() -> None:
     """Frictions of both campaigns that cancel at the reference's speeds could explain any other
     loss at others. The reference shows none, and that counts.
     """
-    base = fit_base(elsewhere((make("coulomb_friction", {"loss": 0.12}),)), _rng())
+    base = fit_base(elsewhere((make("coulomb_friction", {"loss": 0.12}),)))
     both = next(n for n, f in enumerate(base.forms) if f.name == "drive in both")
     assert base.model.sizes[both] == 0
 
-    screen = screen_of_base(prepare_screening(base, _rng()))
+    screen = begin(prepare_screening(base)).first
     assert screen.alarmed
-    assert screen.surprise("coulomb_friction") > screen.threshold
-    assert not screen_of_base(prepare_screening(fit_base(elsewhere(()), _rng()), _rng())).alarmed
+    assert screen.effects.gain("coulomb_friction") > screen.threshold
+    assert not begin(prepare_screening(fit_base(elsewhere(())))).first.alarmed
 
 
 def test_the_new_campaign_does_not_tell_the_noise_or_the_sizes() -> None:
-    quiet, loud = (fit_base(elsewhere(new), _rng()) for new in ((), (NEW,)))
+    quiet, loud = (fit_base(elsewhere(new)) for new in ((), (NEW,)))
     assert quiet.model.sizes == loud.model.sizes
     places = {f.name: number for number, f in enumerate(loud.forms)}
     changes = places["changes in both"]

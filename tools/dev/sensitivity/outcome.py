@@ -84,10 +84,10 @@ def decided(rig: Rig, handed: Handed = lambda *_: None) -> DiagnosisOutcome:
     rng = np.random.default_rng(0)
     handed(rig)
 
-    base = fit_base(rig, rng)
+    base = fit_base(rig)
     handed(base, rng)
 
-    screening = prepare_screening(base, rng)
+    screening = prepare_screening(base)
     handed(screening)
 
     search = search_models(screening)

@@ -4,10 +4,9 @@ A channel's misfit is taken apart by forward selection: steps and windows (the s
 two places) along every covariate compete with smooth functions of the same covariates, all of them
 of one size or in proportion to the channel, each weighed by its log Bayes factor with a uniform
 prior over its places. What drifts or curves is taken by a smooth function and gives no change
-point. A step counts when its evidence exceeds what the largest step of 99 % of the surrogates has,
-over all channels and covariates together. Source: binary segmentation (Scott and Knott 1974,
-Biometrics 30, 507-512) with the null by simulation, since the noise is coloured and the soil was
-fitted.
+point. A step counts when its evidence, averaged over all places, is a likelihood ratio that noise
+alone reaches in one of a hundred campaigns in any channel at most (Markov's inequality). Source:
+binary segmentation (Scott and Knott 1974, Biometrics 30, 507-512).
 """
 
 from __future__ import annotations
@@ -19,13 +18,12 @@ from itertools import islice, pairwise
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import log_bayes, log_evidence_singly
+from gritd.tools.diagnose.fit.evidence import log_bayes, log_bayes_alone
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.projection import Projected, Projection
 from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.screen.screen import tail_quantile
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -78,7 +76,7 @@ def find_changes(screening: Screening, model: Model) -> Changes:
     """Change points of every channel; empty where there are none. Of runs, halfway between their
     numbers.
     """
-    projection = model.fitted.projection(screening.surrogates)
+    projection = model.fitted.projection()
     tried = (
         _competition(screening, model, projection, channel)
         for channel in screening.problem.stack.rig.channels
@@ -87,8 +85,7 @@ def find_changes(screening: Screening, model: Model) -> Changes:
     if not competitions:
         return {}
 
-    nulls = np.max([largest for each in competitions for largest in _nulls(each)], axis=0)
-    threshold = max(tail_quantile(nulls, TUNING.screen.level), TUNING.explain.pays)
+    threshold = float(np.log(len(competitions) / TUNING.screen.level))
 
     changes: Changes = {}
     for competition in competitions:
@@ -248,29 +245,20 @@ def _smooth(screening: Screening, channel: str, own: Bools) -> Iterator[Array]:
 # ---- taking it apart ---------------------------------------------------------------------------
 
 
-def _nulls(competition: Competition) -> Iterator[Array]:
-    """Largest evidence of a step or window along each covariate in every surrogate (draws,)."""
-    for steps in competition.steps:
-        for evidence, _ in _weighed(competition.projected, steps, slice(1, None)):
-            yield evidence.max(axis=0)
-
-
-def _weighed(
-    of: Projected, steps: Steps, which: slice
-) -> Iterator[tuple[Array, Sequence[tuple[int, ...]]]]:
-    """Evidence (candidates, draws) of all steps, then of all windows, and their places."""
-    a, b = of.a[steps.own, steps.own], of.b[steps.own, which]
+def _weighed(of: Projected, steps: Steps) -> Iterator[tuple[Array, Sequence[tuple[int, ...]]]]:
+    """Evidence (candidates,) of all steps, then of all windows, and their places."""
+    a, b = of.a[steps.own, steps.own], of.b[steps.own]
     count = len(a)
     # of the choice of step or window (2), form (2), covariate and width
     price = np.log(2.0 * 2.0 * len(ALONG) * len(TUNING.explain.change_widths))
 
-    single = log_evidence_singly(np.diag(a), b)
+    single = log_bayes_alone(np.diag(a), b)
     yield single - np.log(count) - price, [(i,) for i in range(count)]
 
     if count > 1:
         i, j = np.triu_indices(count, 1)
         inside = np.diag(a)[i] + np.diag(a)[j] - 2.0 * a[i, j]
-        window = log_evidence_singly(inside, b[i] - b[j])
+        window = log_bayes_alone(inside, b[i] - b[j])
         pairs = list(zip(i.tolist(), j.tolist(), strict=True))
         yield window - np.log(len(i)) - price, pairs
 
@@ -332,18 +320,18 @@ def _between_runs(competition: Competition, threshold: float) -> list[Part]:
 
 def _nats(of: Projected, own: slice) -> float:
     """Log likelihood that a block gains."""
-    a, b = of.a[own, own], of.b[own, 0]
+    a, b = of.a[own, own], of.b[own]
     return float(0.5 * b @ np.linalg.solve(a + np.eye(b.size) / TUNING.fit.projected_prior**2, b))
 
 
 def _evidence(left: Projected, block: slice) -> float:
     sign = (0,) * (block.stop - block.start)
-    return float(log_bayes(left.a[block, block], left.b[block, 0], sign))
+    return float(log_bayes(left.a[block, block], left.b[block], sign))
 
 
 def _best(left: Projected, steps: Steps, windows: bool = True) -> Part:
     parts = []
-    for evidence, places in islice(_weighed(left, steps, slice(0, 1)), None if windows else 1):
-        at = int(np.argmax(evidence[:, 0]))
-        parts.append(Part(float(evidence[at, 0]), steps, places[at]))
+    for evidence, places in islice(_weighed(left, steps), None if windows else 1):
+        at = int(np.argmax(evidence))
+        parts.append(Part(float(evidence[at]), steps, places[at]))
     return max(parts, key=lambda part: part.evidence)

@@ -183,11 +183,10 @@ def _not_shown(search: Search) -> list[str]:
     size = {
         name: float(np.trace(projection.project(whiten(noise, likeliest.columns))[0]))
         for name, likeliest in screen.best.items()
-        if isinstance(name, str)
     }
 
     effects = search.problem.stack.rig.effects
-    return [name for name in effects if 0.5 * size.get(name, 0.0) < screen.threshold]
+    return [name for name in effects if not screen.seen(0.5 * size.get(name, 0.0))]
 
 
 def _expected(effect: type[Effect]) -> Effect:
@@ -213,7 +212,7 @@ def _shape_of_misfit(search: Search, separates: tuple[str, ...]) -> NextExperime
     """A step of the condition along which the misfit lives, to tell some effects from it; the gain
     is its evidence so far, for as much again.
     """
-    evidence = search.first.nameless
+    evidence = search.first.unexplained
     if not evidence:
         return None
 

@@ -38,7 +38,7 @@ from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out,
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
-from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.search import Search, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
@@ -106,10 +106,8 @@ def explain(
 
 
 def _test(screen: Screen) -> Test:
-    first, surprise = screen.largest
-    return Test(
-        label(first), surprise, screen.threshold, screen.p, TUNING.screen.level, len(screen.nulls)
-    )
+    first = label(screen.largest)
+    return Test(first, screen.ratio, screen.threshold, screen.p, TUNING.screen.level, 0)
 
 
 def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location, ...]:

@@ -7,6 +7,7 @@ misfit is not told once for every covariate that varies along with it.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -26,9 +27,8 @@ from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.screen.scans import candidates
-from gritd.tools.diagnose.screen.screen import tail_chance
-from gritd.tools.diagnose.screen.screening import Screening, chance_of
+from gritd.tools.diagnose.screen.scans import candidates, without_harmonics
+from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
@@ -98,7 +98,7 @@ def locate(
     residual = stack.measured - predicted
 
     points = changes.find_changes(screening, model)
-    projection = model.fitted.projection(screening.surrogates)
+    projection = model.fitted.projection()
     projected, families = _families(screening, model, projection, points)
 
     places = _smooth_places(stack, residual, projected, families, points)
@@ -122,12 +122,12 @@ def _smooth_places(
     places = []
     for channel in stack.rig.channels:
         here = [f for f in families if f.shape.channel == channel]
-        whole = _gain(projected, _joined(here))[0]
+        whole = projected.gain(_joined(here))[0]
 
         told: list[Family] = []
         for family in _taken_up(projected, here):
-            before, told = _gain(projected, _joined(told))[0], [*told, family]
-            nats = _gain(projected, _joined(told))[0] - before
+            before, told = projected.gain(_joined(told))[0], [*told, family]
+            nats = projected.gain(_joined(told))[0] - before
             share = float(np.clip(nats / max(whole, SPAN), 0.0, 1.0))
             if q[family] <= TUNING.explain.false_discovery and share >= TUNING.explain.least_share:
                 chance = float(q[family])
@@ -165,10 +165,10 @@ def _families(
         np.union1d(own, means[shape.channel]) for shape, own in zip(shapes, spans, strict=True)
     ]
     families = [
-        Family(shape, own, *_gain(projected, own)) for shape, own in zip(shapes, spans, strict=True)
+        Family(shape, own, *projected.gain(own)) for shape, own in zip(shapes, spans, strict=True)
     ]
 
-    chance = chance_of(screening, model, [w.shape.family for w in waves])
+    chance = _chance_of(screening, model, [w.shape.family for w in waves])
     first = len(smooth)
     return projected, families[:first] + [
         replace(family, p=chance[family.shape], wave=wave, prior=wave.prior)
@@ -202,7 +202,7 @@ def _waves(screening: Screening, model: Model, projection: Projection) -> list[S
         own = problem.stack.of(wave.shape.channel)
         ready = whiten_rows(problem.noise, wave.columns[own], own)
         alone = projection.project_rows(ready, own)
-        evidence = float(log_bayes(alone.a, alone.b[:, 0], (0,) * len(alone.a)))
+        evidence = float(log_bayes(alone.a, alone.b, (0,) * len(alone.a)))
         if evidence + wave.prior > turning[wave.shape.channel]:
             kept.append(wave)
     return kept
@@ -220,7 +220,7 @@ def _turning(screening: Screening, projection: Projection, channel: str) -> floa
     columns = np.column_stack((waves.real, waves.imag))
     left = projection.project_rows(whiten_rows(screening.problem.noise, columns, own), own)
     pairs = ([k, k + orders.size] for k in range(orders.size))
-    best = max(float(log_bayes(left.a[np.ix_(k, k)], left.b[k, 0], (0, 0))) for k in pairs)
+    best = max(float(log_bayes(left.a[np.ix_(k, k)], left.b[k], (0, 0))) for k in pairs)
     return best - float(np.log(orders.size))
 
 
@@ -267,14 +267,15 @@ def _joined(families: list[Family]) -> Index:
     return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(f.own for f in families)]))
 
 
-def _gain(projected: Projected, own: Index) -> tuple[float, float]:
-    """Nats gained beyond chance, and the chance of as many."""
-    if not own.size:
-        return 0.0, 1.0
-    smooth = np.linalg.inv(projected.a[np.ix_(own, own)] + np.eye(own.size))
-    nats = 0.5 * np.sum(projected.b[own] * (smooth @ projected.b[own]), axis=0)
-    value, nulls = float(nats[0]), nats[1:]
-    return max(value - float(nulls.mean()), 0.0), tail_chance(nulls, value)
+def _chance_of(
+    screening: Screening, model: Model, searched: Collection[Shape]
+) -> dict[Shape, float]:
+    """Largest chance that noise alone could give of the evidence that families of waves have beside
+    a model (Markov's inequality).
+    """
+    beside = without_harmonics(screening.problem, model.fitted)
+    averages = {f.shape: f.average(beside) for f in screening.families if f.shape in searched}
+    return {shape: float(np.exp(-max(mean, 0.0))) for shape, mean in averages.items()}
 
 
 def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
@@ -303,7 +304,7 @@ def _evidence(projected: Projected, families: list[Family]) -> float:
     if not families:
         return 0.0
     own = _joined(families)
-    evidence = log_bayes(projected.a[np.ix_(own, own)], projected.b[own, 0], (0,) * own.size)
+    evidence = log_bayes(projected.a[np.ix_(own, own)], projected.b[own], (0,) * own.size)
     return float(evidence) + sum(f.prior for f in families)
 
 
@@ -322,8 +323,8 @@ def _false_discovery(p: Array) -> Array:
 def _ripples(
     screening: Screening, projection: Projection, projected: Projected, families: list[Family]
 ) -> list[Place]:
-    """The strongest order of the wheel angle in each channel beside all smooth functions, against
-    every surrogate's. A ripple in any channel by noise alone is as rare as the level of the screen.
+    """The strongest order of the wheel angle in each channel beside all smooth functions. A ripple
+    in any channel by noise alone is as rare as the level of the screen.
     """
     stack = screening.problem.stack
     orders = orders_shown(stack, TUNING.explain.lowest_order)
@@ -334,18 +335,19 @@ def _ripples(
         if size <= 0.0 or not here:
             continue
         left = _beside_smooth(screening, projection, channel, orders, here)
-        nats = np.stack([_pair(left, k, k + orders.size) for k in range(orders.size)])
-        best = int(np.argmax(nats[:, 0]))
+        nats = [_pair(left, k, k + orders.size) for k in range(orders.size)]
+        best = int(np.argmax(nats))
 
-        p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
-        whole = _gain(projected, _joined(here))[0]
-        share = float(nats[best, 0] / max(nats[best, 0] + whole, SPAN))
+        # half of χ² of two degrees, the largest of so many (Bonferroni)
+        p = min(orders.size * float(np.exp(-nats[best])), 1.0)
+        whole = projected.gain(_joined(here))[0]
+        share = nats[best] / max(nats[best] + whole, SPAN)
         q = min(p * len(channels), 1.0)  # any of them may ripple by noise (Bonferroni)
         if q <= TUNING.screen.level and share >= TUNING.explain.least_share:
             amplitude = size * _amplitude(left, best, best + orders.size)
             words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
             location = Location(channel, "wheel_angle", share, p, q, words)
-            places.append(Place(float(nats[best, 0]), location))
+            places.append(Place(nats[best], location))
     return places
 
 
@@ -367,19 +369,19 @@ def _beside_smooth(
     return projection.project_rows(ready, own).without_columns(beyond)
 
 
-def _pair(left: Projected, one: int, two: int) -> Array:
-    """Nats (1 + draws,) that cosine and sine of an order gain."""
+def _pair(left: Projected, one: int, two: int) -> float:
+    """Nats that cosine and sine of an order gain."""
     own = [one, two]
     gained = np.linalg.solve(
         left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2), left.b[own]
     )
-    return np.asarray(0.5 * np.sum(left.b[own] * gained, axis=0))
+    return 0.5 * float(left.b[own] @ gained)
 
 
 def _amplitude(left: Projected, one: int, two: int) -> float:
     own = [one, two]
     a = left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2)
-    return float(np.linalg.norm(np.linalg.solve(a, left.b[own, 0])))
+    return float(np.linalg.norm(np.linalg.solve(a, left.b[own])))
 
 
 def _strains(stack: Stack, model: Model) -> list[Place]:

@@ -30,14 +30,15 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Test:
-    """The alarm: is there a mismatch at all? Its threshold is a quantile of nulls simulated from
-    the data's own noise.
+    """The alarm: is there a mismatch at all? A likelihood ratio, which noise alone makes as large
+    as 1/level in a share `level` of campaigns at most.
 
     name:      what was largest: "omnibus", "strain", or the name of an effect whose signature stood
         out.
-    statistic: its evidence [nats] beyond what noise shows, and the threshold it had to pass.
-    p:         share of the nulls that exceed it, (1 + exceeded)/(1 + nulls).
+    statistic: the log likelihood ratio [nats], and the threshold it had to pass.
+    p:         largest chance that noise alone could give of as much.
     level:     the false-alarm rate at which the threshold was set.
+    nulls:     simulations of noise that it was told by: none.
     """
 
     name: str
@@ -53,7 +54,8 @@ class Location:
     """Where the misfit lives. `share` is the part of the channel's explainable misfit that the
     covariate takes.
 
-    p is by surrogates, q after false-discovery control over all pairs that were tried.
+    p is the chance of as much by noise alone, q after false-discovery control over all pairs that
+    were tried.
     changes: values of the covariate at which the misfit starts or stops; of runs, the number (from
     1) of the first beyond.
     """

@@ -12,7 +12,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.tools.cli.wording import listed, number, shown, spelled
 from gritd.tools.diagnose.explain.result import Fit, Location
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled
 

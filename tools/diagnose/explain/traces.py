@@ -31,8 +31,8 @@ def traces(problem: Problem, before: HeldOut, after: HeldOut) -> tuple[Trace, ..
                 run.name,
                 channel,
                 rig.units[channel],
-                run.time.tolist(),
-                run.measured[channel].tolist(),
+                _digits(run.time),
+                _digits(run.measured[channel]),
                 _spread(before.predicted[own], used),
                 _spread(after.predicted[own], used),
                 used.astype(int).tolist(),
@@ -46,7 +46,12 @@ def _spread(values: Array, used: Bools) -> list[float]:
     """Values at the used places, NaN elsewhere."""
     out = np.full(used.size, np.nan)
     out[used] = values
-    return list(out.tolist())
+    return _digits(out)
+
+
+def _digits(values: Array) -> list[float]:
+    """As many digits as a picture shows, and some more: a file of them is half as large."""
+    return [float(f"{value:.{TUNING.explain.digits}g}") for value in values.tolist()]
 
 
 def scatters(
@@ -67,9 +72,9 @@ def scatters(
                 place.covariate,
                 rig.units[place.channel],
                 rig.units.get(name, ""),
-                x[own].tolist(),
-                (measured - before.predicted[own]).tolist(),
-                (measured - after.predicted[own]).tolist(),
+                _digits(x[own]),
+                _digits(measured - before.predicted[own]),
+                _digits(measured - after.predicted[own]),
                 stack.run[own].tolist(),
                 sigma,
             )

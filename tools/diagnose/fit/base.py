@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.discrepancy import form_freedoms, of_differences
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.marginal import Chosen
@@ -102,6 +102,7 @@ def allowed(stack: Stack) -> Array:
     """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, the relief of the
     bed, and what a learnt discrepancy of the configuration leaves open, last.
     """
-    smooth, held = tolerance(stack, TUNING.fit.tolerance), stack.rig.held
-    own = np.column_stack((smooth, stack.unrest, stack.reliefs))
+    share, held = TUNING.fit.tolerance, stack.rig.held
+    smooth = (tolerance(stack, share), share * of_differences(stack))
+    own = np.column_stack((*smooth, stack.unrest, stack.reliefs))
     return own if held is None else np.column_stack((own, held.doubts(stack)))

@@ -9,11 +9,15 @@ equations shows so by itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gritd.estimator.model.discrepancy import features_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.marginal import Chosen
+from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Bools, FormSource
 from gritd.tools.diagnose.rig.stack import Stack
@@ -31,6 +35,40 @@ def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
     return tuple(freedoms)
 
 
+def usual_sizes(stack: Stack, forms: Sequence[Freedom], model: Model) -> Chosen:
+    """Of each freedom which of its sizes is the largest that is no news.
+
+    Beside a reference, and where nothing is known of it, that is any. One that a configuration
+    holds may be off, as fitted, by the share by which the published laws of an effect differ.
+    """
+    held = _held(stack)
+    out = []
+    for number, one in enumerate(forms):
+        most = len(one.sizes.values) - 1
+        if one.name in held:
+            off = _rms(one.columns @ model.of_form(number))
+            usual = off <= max(TUNING.fit.bending_sizes) * _rms(held[one.name])
+            most = model.sizes[number] if usual else 0
+        out.append(most)
+    return tuple(out)
+
+
+def _held(stack: Stack) -> dict[str, Array]:
+    """What a configuration holds of each freedom (N,), in the channels' units."""
+    if stack.rig.held is None:
+        return {}
+    means = stack.joined(stack.rig.held.means)
+    sources = [source for source in stack.rig.forms if not source.drive]
+    own = {s.name: np.where(_weight(stack, s) != 0.0, means, 0.0) for s in sources}
+    return {name: values for name, values in own.items() if values.any()}
+
+
+def _rms(values: Array) -> float:
+    """Where they are not nought."""
+    acting = values[values != 0.0]
+    return float(np.sqrt(np.mean(acting**2))) if acting.size else 0.0
+
+
 def _form_sizes() -> Sizes:
     return Sizes(TUNING.fit.form_sizes, TUNING.fit.form_prior)
 
@@ -39,10 +77,29 @@ def _drive_sizes() -> Sizes:
     return Sizes(TUNING.fit.drive_sizes, TUNING.fit.drive_prior)
 
 
+def of_differences(stack: Stack) -> Array:
+    """Columns (N, m) of what is lost in a drive, each one as large as the torques whose difference
+    it is: where that is nought, they are still as wrong as they are.
+    """
+    drives = (source for source in stack.rig.forms if source.drive)
+    return np.column_stack([np.zeros((stack.size, 0)), *(_smooth(stack, s) for s in drives)])
+
+
 def _columns(stack: Stack, source: FormSource) -> Array:
     """δ of one source (N, m), for a size of 1: as large as the channel itself."""
+    columns = _smooth(stack, source)
+    return _without_levels(columns, _weight(stack, source)) if source.drive else columns
+
+
+def _weight(stack: Stack, source: FormSource) -> Array:
+    """(N,) of the channels of a source."""
     own = np.any([stack.of(c) for c in source.channels], axis=0)
-    weight = joined(stack, source.weight) * own
+    return np.asarray(joined(stack, source.weight) * own)
+
+
+def _smooth(stack: Stack, source: FormSource) -> Array:
+    """Functions of the conditions (N, m), as large as the channel itself."""
+    weight = _weight(stack, source)
     acting: Bools = weight != 0.0
     if not acting.any():
         return np.zeros((stack.size, 0))
@@ -61,8 +118,7 @@ def _columns(stack: Stack, source: FormSource) -> Array:
         for wave in (np.cos, np.sin)
     ]
     size = _size(stack, source, acting) if source.size is None else source.size
-    columns = np.column_stack((smooth, *turning)) * weight[:, None] * size
-    return _without_levels(columns, weight) if source.drive else columns
+    return np.column_stack((smooth, *turning)) * weight[:, None] * size
 
 
 def _without_levels(columns: Array, weight: Array) -> Array:

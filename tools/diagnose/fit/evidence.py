@@ -62,51 +62,60 @@ def log_sum(terms: Sequence[Array] | Sequence[float] | Array) -> Array:
         return np.asarray(np.log(np.exp(terms - top).sum(axis=0)) + top)
 
 
-def log_bayes(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
-    """ln B of one signature, () or (draws,): A (p, p), b (p,) or (p, draws)."""
-    values, vectors = np.linalg.eigh(0.5 * (a + a.T))
+def log_bayes(a: Array, b: Array, sign: Sequence[int]) -> Array:
+    """ln B (…) of columns together: A (…, p, p), b (…, p); sign: of each strength, 0 where it has
+    no bound.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (a + a.swapaxes(-1, -2)))
     values = np.maximum(values, 0.0)
-    turned = vectors.T @ b
+    turned = np.einsum("...ij,...i->...j", vectors, b)
 
     parts = []
     for scale in strength_sizes():
         variance = 1.0 / (values + scale**-2)
-        gain = 0.5 * (variance @ turned**2)
-        part = gain - 0.5 * np.log1p(scale**2 * values).sum()
-        parts.append(part + _one_sided(vectors, variance, turned, sign))
-    return np.asarray(log_sum(parts) - np.log(len(strength_sizes())))
-
-
-def _one_sided(vectors: Array, variance: Array, turned: Array, sign: tuple[int, ...]) -> Array:
-    """ln of twice the posterior share on the allowed side, for each bounded strength."""
-    total = np.zeros(turned.shape[1:])
-    if not any(sign):
-        return total
-    mean = (vectors * variance) @ turned
-    sigma = np.sqrt((vectors**2) @ variance)
-    for i, side in enumerate(sign):
-        if side:
-            total = total + log_ndtr(side * mean[i] / sigma[i]) + np.log(2.0)
-    return total
-
-
-def subsets(count: int) -> list[tuple[int, ...]]:
-    """All strengths together, and each alone: an effect may act through one of them only."""
-    everything = tuple(range(count))
-    return [everything] if count == 1 else [everything, *((i,) for i in everything)]
-
-
-def log_evidence(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
-    """ln B averaged over the subsets of strengths: A (p, p), b (p,) or (p, draws)."""
-    parts = [
-        log_bayes(a[np.ix_(s, s)], b[list(s)], tuple(sign[i] for i in s))
-        for s in subsets(len(sign))
-    ]
+        gain = 0.5 * np.sum(variance * turned**2, axis=-1)
+        spread = 0.5 * np.log1p(scale**2 * values).sum(axis=-1)
+        parts.append(gain - spread + _one_sided(vectors, variance, turned, sign))
     return np.asarray(log_sum(parts) - np.log(len(parts)))
 
 
-def log_evidence_singly(a: Array, b: Array) -> Array:
-    """ln B (n, d) of each of n single columns: a (n,), b (n, d); averaged over the sizes."""
-    scale = strength_sizes()[:, None, None]
-    gain = 0.5 * b**2 / (a[:, None] + scale**-2) - 0.5 * np.log1p(scale**2 * a[:, None])
-    return np.asarray(log_sum(gain) - np.log(len(strength_sizes())))
+def _one_sided(
+    vectors: Array, variance: Array, turned: Array, sign: Sequence[int]
+) -> Array | float:
+    """ln of twice the posterior share (…) on the allowed side, for each bounded strength."""
+    bounded = np.flatnonzero(np.asarray(sign))
+    if not bounded.size:
+        return 0.0
+    own, side = vectors[..., bounded, :], np.asarray(sign)[bounded]
+    mean = np.einsum("...ij,...j->...i", own, variance * turned)
+    sigma = np.sqrt(np.einsum("...ij,...j->...i", own**2, variance))
+    return np.asarray(np.sum(log_ndtr(side * mean / sigma) + np.log(2.0), axis=-1))
+
+
+def log_bayes_alone(a: Array, b: Array, sign: Sequence[int] | int = 0) -> Array:
+    """ln B (…, m) of each column alone: squares a (…, m), scores b (…, m)."""
+    side, parts = np.asarray(sign), []
+    for scale in strength_sizes():
+        precision = a + scale**-2
+        shown = log_ndtr(side * b / np.sqrt(precision)) + np.log(2.0)
+        gain = 0.5 * b**2 / precision - 0.5 * np.log1p(scale**2 * a)
+        parts.append(gain + np.where(side != 0, shown, 0.0))
+    return np.asarray(log_sum(parts) - np.log(len(parts)))
+
+
+def log_bayes_expected(a: Array) -> float:
+    """ln B of strengths that have their expected size, in the mean over noise: squares a (p,)."""
+    a, scale = np.maximum(a, 0.0), strength_sizes()[:, None]
+    each = 0.5 * a * (a + 1.0) / (a + scale**-2) - 0.5 * np.log1p(scale**2 * a)
+    return float(log_sum(each.sum(axis=1)) - np.log(len(scale)))
+
+
+def log_evidence(a: Array, b: Array, sign: Sequence[int]) -> Array:
+    """ln B (s,) averaged over all strengths together and each alone, through one of which an effect
+    may act: A (s, p, p), b (s, p).
+    """
+    alone = log_bayes_alone(np.diagonal(a, axis1=1, axis2=2), b, sign)
+    if len(sign) == 1:
+        return np.asarray(alone[:, 0])
+    parts = [log_bayes(a, b, sign), *alone.T]
+    return np.asarray(log_sum(parts) - np.log(len(parts)))

@@ -60,6 +60,11 @@ class Model:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
         return self._amount(0, self._of_form)
 
+    def of_form(self, number: int) -> Array:
+        """Weights (m,) of one discrepancy of form times its size, averaged over the sizes."""
+        assert self.marginal is not None
+        return self.marginal.moments(self.chosen, self.marginal.place_of(number))[0]
+
     def zeros(self) -> Array:
         """What zeros without a law amount to beyond our formula of them (N,), whitened: of effects
         that go as they like along some covariate.

@@ -17,7 +17,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
 from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
-from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
+from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant
 from gritd.tools.diagnose.rig.stack import Stack
@@ -101,20 +101,9 @@ class Fitted:
         """Standard deviations of the same (n,)."""
         return np.sqrt(np.diag(self.covariance()))
 
-    def allowed(self, allowance: Allowance) -> Fitted:
-        """The same point and slopes with another allowance, not fitted to it: for a projection."""
-        slack = np.zeros(allowance.count)
-        penalty = np.concatenate((self.penalty[: self.centre.size], np.ones_like(slack)))
-        pulled = allowance.pulled(self.own)
-        return replace(self, allowance=allowance, slack=slack, penalty=penalty, pulled=pulled)
-
-    def projection(self, surrogates: Surrogates | None = None) -> Projection:
+    def projection(self) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
-        return Projection(self._scaled(), self.residual, self._strain(), surrogates)
-
-    def resized(self, sizes: Sequence[Array]) -> ResizedProjections:
-        """The same with some more sizes (q + p + t,) of the directions, for each its own."""
-        return ResizedProjections(self._scaled(), self.residual, self._strain(), sizes)
+        return Projection(self._scaled(), self.residual, self._strain())
 
     def _scaled(self) -> Array:
         """Directions (N, q + p + t) in prior σ."""

@@ -32,26 +32,26 @@ from gritd.tools.diagnose.noise.estimate import estimate_of_reference, louder, r
 from gritd.tools.diagnose.noise.saturated import Explainable
 
 
-def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
+def fit_beside_reference(rough: BaseFit) -> BaseFit:
     """From a rough fit of both campaigns: first in the least noise that the reference may have,
     then in what the fit left of it.
     """
     stack = rough.problem.stack
     shared = shared_columns(stack, rough.fitted.u, rough.fitted.predicted)
     none = np.zeros((stack.size, 0))
-    noise = _least_noise(rough, shared, none, rng)
+    noise = _least_noise(rough, shared, none)
     first = _of_reference(rough, noise, shared, none)
 
     ripples = rippling_columns(stack, left(first))
     again = first
     if ripples.shape[1]:
-        noise = _least_noise(rough, shared, ripples, rng)
+        noise = _least_noise(rough, shared, ripples)
         again = _of_reference(first, noise, shared, ripples)
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
     calm = without_ripples(stack, left(again), ripples)
-    alone = estimate_of_reference(stack, predicted, left(again), calm, nothing, noise, rng)
+    alone = estimate_of_reference(stack, predicted, left(again), calm, nothing, noise)
     noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(again, noise, shared, ripples)
@@ -76,9 +76,7 @@ def left(base: BaseFit) -> Array:
     return np.asarray(base.problem.stack.measured - fitted.predicted - freedoms)
 
 
-def _least_noise(
-    rough: BaseFit, shared: Mapping[str, Array], ripples: Array, rng: np.random.Generator
-) -> Noise:
+def _least_noise(rough: BaseFit, shared: Mapping[str, Array], ripples: Array) -> Noise:
     """What no function of the form, no effect and no constant could explain of the reference."""
     stack, before = rough.problem.stack, rough.problem.noise
     forms = [f.columns for f in form_freedoms(stack, before)]
@@ -88,5 +86,5 @@ def _least_noise(
     residual = stack.measured - predicted
     calm = without_ripples(stack, residual, ripples)
     return estimate_of_reference(
-        stack, predicted, residual, calm, Explainable(leading, whole), before, rng
+        stack, predicted, residual, calm, Explainable(leading, whole), before
     )

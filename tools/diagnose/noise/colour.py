@@ -1,4 +1,4 @@
-"""The noise of each channel: its size and colour; whitening, and surrogates of it.
+"""The noise of each channel: its size and colour; whitening.
 
 A value's noise is white noise plus two Ornstein-Uhlenbeck processes: a fast one (what neighbouring
 slopes share) and a slow one of correlation time τ. Its size and colour are found in estimate.py.
@@ -39,11 +39,10 @@ class Colour:
 
 @dataclass(frozen=True)
 class Noise:
-    """A colour for each channel to whiten with, and draws from its posterior for surrogates."""
+    """A colour for each channel to whiten with."""
 
     stack: Stack
     colours: tuple[Colour, ...]
-    draws: tuple[tuple[Colour, ...], ...]  # per channel
     uncertain: Array  # (N,) what adds to the noise of single values, same unit as the value
     # (N, m) what each run may do for itself, each column one standard deviation (replicates.py)
     of_runs: Array
@@ -190,11 +189,6 @@ def _log_det(recursion: tuple[Array, Array, Array]) -> Array:
     return np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
-def innovation_variance(gaps: Array, colours: Sequence[Colour]) -> Array:
-    """Usual variance (g,) of an innovation of noise of each colour and unit variance."""
-    return np.asarray(np.median(_recursion(gaps, colours)[2] ** 2, axis=0))
-
-
 def _recursion(
     gaps: Array, colours: Sequence[Colour], beside: Array | None = None
 ) -> tuple[Array, Array, Array]:
@@ -247,24 +241,6 @@ def whiten_rows(noise: Noise, columns: Array, rows: Bools) -> Array:
     they touch.
     """
     return np.asarray(noise.whitener[rows][:, rows] @ columns)
-
-
-def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
-    """Noise (N, count), size and colour drawn from their posterior: what the recordings hold when
-    nothing is amiss.
-    """
-    stack = noise.stack
-    out = np.empty((stack.size, count))
-    for channel, draws in zip(stack.rig.channels, noise.draws, strict=True):
-        own = stack.of(channel)
-        for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
-            out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
-
-    alone = rng.standard_normal(out.shape)
-    alone *= noise.uncertain[:, None]  # in their place: they are large
-    out *= noise.times[:, None]
-    out += alone
-    return out
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:

@@ -79,11 +79,8 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         sigma = NORMAL * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), TUNING.noise.slow_times[0], 0.0))
 
-    draws = tuple((c,) for c in colours)
     nothing = np.zeros((stack.size, 0))
-    return Noise(
-        stack, tuple(colours), draws, uncertain(stack, predicted, residual, colours), nothing
-    )
+    return Noise(stack, tuple(colours), uncertain(stack, predicted, residual, colours), nothing)
 
 
 def estimate(
@@ -91,7 +88,6 @@ def estimate(
     predicted: Array,
     explainable: Explainable,
     before: Noise,
-    rng: np.random.Generator,
     jobs: int = 1,
 ) -> Noise:
     """Size and colour of each channel from a rough prediction (N,), and what each run does for
@@ -108,10 +104,9 @@ def estimate(
         lambda channel: _posterior(stack, channel, residual, saturated, cells, before, ~stack.idle),
         stack.rig.channels,
     )
-    posteriors = [_chosen(stack, posterior, rng) for posterior in told]
-    colours = tuple(f[0] for f in posteriors)
+    colours = _chosen(stack, told)
     own = replicates.own_columns(stack, residual, colours, waves)
-    noise = _noise(stack, predicted, residual, posteriors, own, explainable.leading)
+    noise = _noise(stack, predicted, residual, colours, own, explainable.leading)
     return calmer(noise, residual, saturated, cells, before, stack.idle)
 
 
@@ -122,7 +117,6 @@ def estimate_of_reference(
     calm: Array,
     explainable: Explainable,
     before: Noise,
-    rng: np.random.Generator,
 ) -> Noise:
     """The same from a reference campaign: all that its residual (N,) shows beside what is
     explainable is what this rig does when nothing is new, waves included.
@@ -135,10 +129,10 @@ def estimate_of_reference(
         _posterior(stack, channel, residual, explainable, cells, before, ~stack.new & ~stack.idle)
         for channel in stack.rig.channels
     ]
-    posteriors = [_chosen(stack, posterior, rng) for posterior in told]
+    colours = _chosen(stack, told)
 
     none = np.zeros((stack.size, 0))
-    noise = _noise(stack, predicted, calm, posteriors, none, explainable.leading)
+    noise = _noise(stack, predicted, calm, colours, none, explainable.leading)
     return calmer(noise, residual, explainable, cells, before, stack.idle & ~stack.new)
 
 
@@ -171,22 +165,14 @@ def _noise(
     stack: Stack,
     predicted: Array,
     residual: Array,
-    posteriors: Sequence[tuple[Colour, ...]],
+    colours: tuple[Colour, ...],
     own: Array,
     explainable: Array,
 ) -> Noise:
-    """Of each channel's posterior the first colour; own: columns (N, m) of each run by itself;
-    explainable: columns (N, p).
+    """Of a colour of each channel; own: columns (N, m) of each run by itself; explainable: columns
+    (N, p).
     """
-    colours = tuple(each[0] for each in posteriors)
-
-    return Noise(
-        stack,
-        colours,
-        tuple(each[1:] for each in posteriors),
-        uncertain(stack, predicted, residual, colours, explainable),
-        own,
-    )
+    return Noise(stack, colours, uncertain(stack, predicted, residual, colours, explainable), own)
 
 
 def louder(one: Noise, other: Noise) -> Noise:
@@ -195,11 +181,7 @@ def louder(one: Noise, other: Noise) -> Noise:
     pairs = list(zip(one.colours, other.colours, strict=True))
     power = [[c.sigma**2 * _slow_power(c, step) for c in pair] for pair in pairs]
     number = [int(np.argmax(both)) for both in power]
-    return replace(
-        other,
-        colours=tuple(pair[n] for pair, n in zip(pairs, number, strict=True)),
-        draws=tuple((one, other)[n].draws[channel] for channel, n in enumerate(number)),
-    )
+    return replace(other, colours=tuple(pair[n] for pair, n in zip(pairs, number, strict=True)))
 
 
 def restless(noise: Noise, residual: Array) -> Noise:
@@ -276,13 +258,10 @@ def _posterior(
     return sized, weight / weight.sum()
 
 
-def _chosen(
-    stack: Stack, posterior: tuple[list[Colour], Array], rng: np.random.Generator
-) -> tuple[Colour, ...]:
-    """The colour to whiten with, then draws from the posterior."""
-    sized, weight = posterior
-    drawn = rng.choice(len(sized), TUNING.noise.surrogate_colours, p=weight)
-    return _careful(sized, weight, step_of(stack.gaps)), *(sized[i] for i in drawn)
+def _chosen(stack: Stack, posteriors: Sequence[tuple[list[Colour], Array]]) -> tuple[Colour, ...]:
+    """Of each channel the colour to whiten with."""
+    step = step_of(stack.gaps)
+    return tuple(_careful(sized, weight, step) for sized, weight in posteriors)
 
 
 def colours() -> list[Colour]:

@@ -46,14 +46,6 @@ class HeldForm:
             self._mean(conditions, weights, channels) for conditions, weights in told
         ]
 
-    @property
-    def covered(self) -> float:
-        """See interface.Held."""
-        conditions, driven = np.vstack(self._conditions), np.any(np.vstack(self._weights), axis=1)
-        squares = np.sum(self._correction.features(conditions) ** 2, axis=1)
-        known = self._correction.told(self._correction.inside(conditions), squares)[driven]
-        return float(np.mean(1.0 - known < TUNING.screen.reference_open)) if known.size else 0.0
-
     def doubts(self, stack: Stack) -> Array:
         """(N, t): see interface.Held."""
         correction = self._correction.at(

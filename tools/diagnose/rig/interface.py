@@ -166,10 +166,6 @@ class Held(Protocol):
     def means(self) -> Sequence[Mapping[str, Array]]:
         """Per run, mean (n,) in every channel, in its unit."""
 
-    @property
-    def covered(self) -> float:
-        """Share of what is driven at whose conditions little of it was left open."""
-
     def doubts(self, stack: Stack) -> Array:
         """Columns (N, t) of unit normal weights: what is left open of it."""
 

@@ -2,10 +2,9 @@
 the bed.
 
 A family is one channel along one axis, with a wave at every frequency that the grid shows, or a
-step at every place. Its evidence is the average over all of them, in the recordings and in every
-surrogate alike, so that the number of frequencies and places tried is paid for. Cosine and sine of
-a wave are of one size and at a right angle to each other; so are those of one stretch to another's:
-what this leaves out is small, and the same for the surrogates. Where a wave's
+step at every place. Its evidence is the average over all of them, so that the number of frequencies
+and places tried is paid for. Cosine and sine of a wave are of one size and at a right angle to each
+other; so are those of one stretch to another's: what this leaves out is small. Where a wave's
 neighbours in the spectrum hold more than the noise that is assumed, its power counts by so much
 less: a line stands out of what is near it, whatever the colour.
 """
@@ -23,7 +22,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
+from gritd.tools.diagnose.fit.projection import Block, Projection
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise import lines
@@ -63,38 +62,37 @@ class Family:
         return (False,) if self.axis == "time" else (False, True)
 
     def evidence(self, beside: Projection, near: Array | None = None) -> Array:
-        """Log Bayes factor (p, f, 1 + draws) of every shape, p phases, beside a model; with
-        neighbours, by what it stands out of them.
+        """Log Bayes factor (p, f) of every shape, p phases, beside a model; with neighbours, by
+        what it stands out of them.
         """
         projected = [beside.project_block(block) for block in self.blocks]
         return np.stack([_weighed(projected, self.at.size, one, near) for one in self.phases])
 
     def in_phase(self, beside: Projection, shared: bool) -> Array:
-        """The same (f, 1 + draws), with one coefficient for all blocks or one for each."""
+        """The same (f,), with one coefficient for all blocks or one for each."""
         projected = [beside.project_block(block) for block in self.blocks]
         return _weighed(projected, self.at.size, shared, None)
 
-    def average(self, beside: Projection) -> Array:
-        """Log Bayes factor (1 + draws,) of the family."""
+    def average(self, beside: Projection) -> float:
+        """Log Bayes factor of the family."""
         every = self.evidence(beside, self.near)
-        count = every.shape[0] * every.shape[1]
-        return np.asarray(log_sum(every.reshape(count, -1)) - np.log(count))
+        return float(log_sum(every.ravel()) - np.log(every.size))
 
 
 def _weighed(
     projected: Sequence[tuple[Array, Array, Array]], count: int, shared: bool, near: Array | None
 ) -> Array:
-    """Log Bayes factor (count, draws) from squares, coordinates and scores of every block."""
+    """Log Bayes factor (count,) from squares, coordinates and scores of every block."""
     if shared:
         squares, inside, b = (np.sum([f[i] for f in projected], axis=0) for i in range(3))
         projected = [(squares, inside, b)]
 
     width = projected[0][0].size // count
     sizes = [
-        np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)[:, None]
+        np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)
         for s, i, _ in projected
     ]
-    powers = [np.sum(b.reshape(count, width, -1) ** 2, axis=1) for _, _, b in projected]
+    powers = [np.sum(b.reshape(count, width) ** 2, axis=1) for _, _, b in projected]
 
     level = 1.0 if near is None else _level(sizes, powers, near)
 
@@ -108,7 +106,7 @@ def _weighed(
 
 
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
-    """Geometric mean (f, draws) of the neighbours' power, in that of the noise; 1 at least."""
+    """Geometric mean (f,) of the neighbours' power, in that of the noise; 1 at least."""
     ratio = np.sum(
         [power / np.maximum(size, SIZE) for size, power in zip(sizes, powers, strict=True)], axis=0
     )
@@ -233,7 +231,7 @@ def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> li
 
 
 def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Signature]:
-    every = family.evidence(beside)[..., 0]
+    every = family.evidence(beside)
     share = -float(np.log(every.size))
     best = every.max(axis=0)
     edge = np.full(1, -np.inf)
@@ -256,7 +254,7 @@ def _refined(
         family.at[1] - family.at[0] if family.at.size > 1 else 0.0
     )
     finer = waves(problem.stack, problem.noise, family.shape.channel, family.axis, near)
-    return float(near[int(np.argmax(finer.in_phase(beside, shared)[:, 0]))])
+    return float(near[int(np.argmax(finer.in_phase(beside, shared)))])
 
 
 def in_step(
@@ -282,9 +280,9 @@ def in_step(
     tried = shape.at + reach * np.linspace(-1.0, 1.0, count)
 
     finer = waves(stack, problem.noise, shape.channel, "time", tried)
-    value = finer.in_phase(beside, True)[:, 0] - np.log(count)
+    value = finer.in_phase(beside, True) - np.log(count)
     best = int(np.argmax(value))
-    if value[best] < finer.in_phase(beside, False)[:, 0].max():
+    if value[best] < finer.in_phase(beside, False).max():
         return wave
     return _signature(stack, replace(shape, at=float(tried[best]), shared=True), wave.prior)
 
@@ -315,16 +313,14 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
     return out
 
 
-def without_harmonics(
-    problem: Problem, fitted: Fitted, surrogates: Surrogates | None = None
-) -> Projection:
+def without_harmonics(problem: Problem, fitted: Fitted) -> Projection:
     """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too, and
     ripples of the recordings that are too fast for the grid.
 
     At a steady speed they are waves in time and along the bed, and another published form of the
     ripple has them.
     """
-    projection, columns = fitted.projection(surrogates), list(_harmonics(problem.stack, fitted))
+    projection, columns = fitted.projection(), list(_harmonics(problem.stack, fitted))
     if not columns:
         return projection
 

@@ -1,294 +1,247 @@
-"""What is looked for beside a fitted model: listed effects, smooth functions, waves and steps."""
+"""What is looked for beside a fitted model, and whether anything is amiss at all.
+
+The recordings are explained by the exact model, or by its discrepancy of form δ, or with one of the
+listed effects, or with something that has no name: a function of time or place, a wave, a step.
+With the evidence Z of each,
+
+    alarm = ln [(Z_δ + mean Z_effect + mean Z_unexplained) / 3] − ln Z_exact.
+
+The chance of a likelihood ratio above R by noise alone is 1/R at most (Markov's inequality), so
+ln 100 is an alarm that is false once in a hundred campaigns. An effect is tried beside the exact
+model too. Where δ is known to be there, as the configuration holds one that was learnt or a
+reference campaign shows it, the alarm is that of effects and the unexplained against Z_δ, and must
+be more than what the runs of the reference would raise (usual.py).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
-from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.base import BaseFit
-from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.discrepancy import usual_sizes
+from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_sum
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
-from gritd.tools.diagnose.fit.signatures import shape_grid, signature, some_of
-from gritd.tools.diagnose.noise.colour import surrogates, whiten
-from gritd.tools.diagnose.rig.interface import HAD
-from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.screen.covered import covered_share
-from gritd.tools.diagnose.screen.habit import habits
-from gritd.tools.diagnose.screen.open_colour import OpenNoise
-from gritd.tools.diagnose.screen.open_form import gain_with_form_open
-from gritd.tools.diagnose.screen.ripples import loudest
+from gritd.tools.diagnose.noise.colour import whiten
+from gritd.tools.diagnose.screen.evidence import Pass, one_pass
+from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
-from gritd.tools.diagnose.screen.screen import (
-    Part,
-    Screen,
-    WhitenedSignature,
-    screen_signatures,
-    tail_chance,
-    whitened,
-)
+from gritd.tools.diagnose.screen.usual import unnamed_in_both, usual
 from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
 class Screening:
-    """All that may be amiss beside the effects, and what noise alone would show of it."""
+    """All that may be amiss beside the effects.
+
+    base: exact in its form; forms: what the form of the model may be off by; functions: smooth
+    functions without a name; families: waves and steps without a name.
+    """
 
     problem: Problem
     base: Model
-    forms: tuple[Freedom, ...]  # what the form of the model may be off by
-    functions: tuple[Signature, ...]  # smooth functions without a name
-    families: tuple[Family, ...]  # waves and steps without a name
-    surrogates: Surrogates
+    forms: tuple[Freedom, ...]
+    functions: tuple[Signature, ...]
+    families: tuple[Family, ...]
+
+    @property
+    def beyond_form(self) -> list[Signature]:
+        """Smooth functions that the form of the model cannot be; of a new campaign beside its
+        reference all.
+        """
+        if self.problem.stack.referred:
+            return list(self.functions)
+        sources = self.problem.stack.rig.forms
+        formed = {channel for source in sources for channel in source.channels}
+        return [
+            s
+            for s in self.functions
+            if s.shape.channel not in formed or set(s.shape.along) <= BEYOND_FORM
+        ]
 
     def shapes(self, model: Model) -> list[Signature]:
         """What the form of the model cannot be: smooth functions of time and place, and the
         likeliest waves and steps beside a model.
         """
-        formed = {channel for source in self.problem.stack.rig.forms for channel in source.channels}
-        beyond = [
-            s
-            for s in self.functions
-            if s.shape.channel not in formed or set(s.shape.along) <= BEYOND_FORM
-        ]
-        return [*beyond, *candidates(self.families, self.problem, model.fitted)]
+        return [*self.beyond_form, *candidates(self.families, self.problem, model.fitted)]
 
 
-def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
+def prepare_screening(base: BaseFit) -> Screening:
     """Everything that screens of any model share."""
-    noise, unknowns = base.problem.noise, base.fitted.penalty.size
-    residuals = whiten(noise, surrogates(noise, TUNING.screen.nulls, rng))
-    drawn = Surrogates(residuals, rng.standard_normal((unknowns, TUNING.screen.nulls)))
-
-    stack = base.problem.stack
+    problem = base.problem
     return Screening(
-        base.problem,
+        problem,
         base.model,
         base.forms,
-        smooth_signatures(stack),
-        families(stack, noise),
-        drawn,
+        smooth_signatures(problem.stack),
+        families(problem.stack, problem.noise),
     )
 
 
-def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
-    """Evidence for an effect, and for a misfit without a name, beside the base model.
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """effects: beside the model with its discrepancy; unexplained: log Bayes factor of what has no
+    name, beside the same [nats].
+
+    exact:  log evidence of the model that is taken for right where nothing is amiss.
+    formed: whether its discrepancy is none of the alarm.
+    ripple: chance of the likeliest new ripple that the recordings show at their own rate.
+    strain: [σ] of the constant that stands farthest from what is known of it, and its name.
+    usual:  what so many runs of a reference would raise [nats] (usual.py).
+    """
+
+    effects: Pass
+    unexplained: Mapping[Shape, float]
+    exact: float
+    formed: bool
+    ripple: float
+    strain: float
+    usual: float = 0.0
+    constant: str = ""
+
+    @property
+    def evidence(self) -> dict[Candidate, float]:
+        """Log Bayes factor of every candidate beside the discrepancy of form [nats]."""
+        effects: dict[Candidate, float] = {n: self.effects.gain(n) for n in self.effects.effects}
+        return effects | dict(self.unexplained)
+
+    @property
+    def best(self) -> dict[str, Signature]:
+        """The likeliest signature of every effect."""
+        return {name: every[0].signature for name, every in self.effects.effects.items()}
+
+    @property
+    def ratio(self) -> float:
+        """The alarm [nats]."""
+        means = [value for value in self.kinds.values()]
+        return float(log_sum(means) - np.log(len(means)) - self.exact) if means else 0.0
+
+    @property
+    def kinds(self) -> dict[str, float]:
+        """Mean log evidence of every kind of explanation that is not the exact model [nats]."""
+        alone, names = self.effects.alone, list(self.effects.effects)
+        exact = [self.exact + self.effects.exact(name) for name in names]
+        kinds = {
+            "form": [alone],
+            "effects": [self.effects.evidence(name) for name in names],
+            "unexplained": [alone + value for value in self.unexplained.values()],
+        }
+        if not self.formed:
+            kinds["effects of the exact"] = exact
+        return {k: float(log_sum(each)) - np.log(len(each)) for k, each in kinds.items() if each}
+
+    @property
+    def largest(self) -> Candidate:
+        """What is likeliest to be amiss: a candidate, or the constant that strains more."""
+        evidence = self.evidence
+        if self.constant and 0.5 * self.strain**2 > max(evidence.values(), default=0.0):
+            return Shape(self.constant, (self.constant,), "strain")
+        return max(evidence, key=lambda of: evidence[of], default="nothing")
+
+    @property
+    def threshold(self) -> float:
+        """What the alarm must reach [nats]."""
+        return self.usual - float(np.log(TUNING.screen.level))
+
+    def seen(self, evidence: float) -> bool:
+        """Whether one effect of so much evidence would be an alarm."""
+        count = len(self.kinds) * max(len(self.effects.effects), 1)
+        return evidence > self.threshold + float(np.log(count))
+
+    @property
+    def p(self) -> float:
+        """The largest chance that noise alone could give of what is seen."""
+        beyond = max(self.ratio - self.usual, 0.0)
+        return float(min(np.exp(-beyond), self.ripple, self.strained))
+
+    @property
+    def strained(self) -> float:
+        """Chance of a constant as far from what is known of it, in any of so many kinds."""
+        far = 2.0 * float(ndtr(-self.strain))
+        return min(TUNING.screen.kinds * far, 1.0) if self.strain > TUNING.screen.beyond else 1.0
+
+    @property
+    def on_grid(self) -> bool:
+        """Whether something stands out on the grid, or a constant strains beyond belief."""
+        return self.ratio > self.threshold or self.strain > TUNING.screen.beyond
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether something stands out on the grid, or a ripple at the recordings' own rate."""
+        return self.on_grid or self.ripple < TUNING.screen.line
+
+
+def screen(screening: Screening, bare: Model, jobs: int = 1) -> Screen:
+    """The pass over every effect, and what has no name, beside the model with its discrepancy.
 
     jobs: processes.
     """
-    problem, model, drawn = screening.problem, screening.base, screening.surrogates
-    if problem.stack.referred:
-        screen = _screen_beside_reference(screening, model)
-        counts = max(_covered(screening), TUNING.screen.least_covered)
-        open_ = counts * _open_form(screening, model, screen)
-        ripple = _ripple(problem) ** counts  # as evidence, it counts by the covered share
-        strain = strain_of(problem, model)
-        return replace(screen, open=open_, ripple=ripple, counts=counts, strain=strain)
-    searched = _averages(screening, model, jobs)
-    projection = model.fitted.projection(drawn)
-    kept = screening.functions
-    screen = screen_signatures(projection, _parts(screening, model), searched, jobs, kept)
-
-    # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
-    open_ = np.inf if problem.stack.rig.tabled else _open(screening, model, screen, jobs)
-    return replace(screen, open=open_, ripple=_ripple(problem), strain=strain_of(problem, model))
+    problem, rig = screening.problem, screening.problem.stack.rig
+    effects = one_pass(problem, bare, jobs=jobs)
+    formed = problem.stack.referred or rig.held is not None
+    exact = _exact(screening, bare)
+    unexplained = _unexplained(screening, bare)
+    ripple = min((line.p for line in rig.lines.fresh()), default=1.0)
+    strained = bare if formed else screening.base
+    strain, constant = strain_of(problem, strained)
+    shown = usual(problem, bare, effects) if problem.stack.referred else 0.0
+    return Screen(effects, unexplained, exact, formed, ripple, strain, shown, constant)
 
 
-def strain_of(problem: Problem, model: Model) -> float:
-    """How far the farthest constant of a fit stands from what is known of it [σ]; beside a
-    reference, of those that tell what is new.
+def _exact(screening: Screening, bare: Model) -> float:
+    """Log evidence where nothing is amiss: of the exact model, or of a discrepancy that is known
+    to be there and no larger than is known; beside a reference also of what both campaigns show.
     """
-    referred = problem.stack.referred
-    told = [bool(constant.changes) or not referred for constant in problem.stack.rig.constants]
-    return float(np.max(np.abs(model.fitted.u[np.array(told, bool)]), initial=0.0))
+    problem, forms = screening.problem, screening.forms
+    if not (problem.stack.referred or problem.stack.rig.held is not None):
+        return Gram(problem, screening.base).total
+
+    known = Gram(problem, bare).up_to(usual_sizes(problem.stack, forms, bare))
+    if not problem.stack.referred:
+        return known
+    both = unnamed_in_both(problem, bare, screening.beyond_form, screening.families)
+    return known + float(np.logaddexp(0.0, both) - np.log(2.0))
 
 
-def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
-    """A screen without a reference, where the configuration holds a learnt discrepancy: this rig is
-    known to be off the equations, so what is new must be more than a further discrepancy of any
-    size, the more so where it was not learnt. bare: the model without effects with that.
+def strain_of(problem: Problem, model: Model) -> tuple[float, str]:
+    """How far the farthest constant of a fit stands from what is known of it [σ], and its name;
+    beside a reference, of those that tell what is new.
     """
-    held = screening.problem.stack.rig.held
-    if held is None or screening.problem.stack.referred or not screen.on_grid:
-        return screen
-    counts = max(held.covered, TUNING.screen.least_covered)
-    left = counts * _open_form(screening, bare, screen)
-    most = max(screen.asked, asked(screening.problem.stack))
-    least, strain = min(screen.open, left), strain_of(screening.problem, bare)
-    return replace(screen, open=least, counts=counts, asked=most, strain=strain)
+    constants, referred = problem.stack.rig.constants, problem.stack.referred
+    told = zip(constants, np.abs(model.fitted.u).tolist(), strict=True)
+    each = [(u, c.name) for c, u in told if c.changes or not referred]
+    return max(each, default=(0.0, ""))
 
 
-def _parts(screening: Screening, model: Model) -> list[Part]:
-    """Everything that is tried but waves and steps, some effects at a time."""
-    problem = screening.problem
-
-    def effects(names: Sequence[str]) -> Iterator[WhitenedSignature]:
-        with problem.stack.rig.aside():  # the same bits, whatever was tried before
-            yield from whitened(problem.noise, _signatures(problem, model, names))
-
-    def others() -> Iterator[WhitenedSignature]:
-        return whitened(problem.noise, chain(screening.functions, _strains(problem, model)))
-
-    return [*(partial(effects, names) for names in some_of(problem.stack.rig.effects)), others]
-
-
-def _averages(screening: Screening, model: Model, jobs: int) -> dict[Shape, Array]:
-    """Log Bayes factor (1 + draws,) of every family of waves or steps beside a model."""
-    beside = without_harmonics(screening.problem, model.fitted, screening.surrogates)
-    every = each(jobs, lambda family: family.average(beside), screening.families)
-    return {family.shape: mean for family, mean in zip(screening.families, every, strict=True)}
-
-
-def _ripple(problem: Problem) -> float:
-    """Chance of the likeliest new ripple of the wheel at full rate."""
-    return min((line.p for line in problem.stack.rig.lines.fresh()), default=1.0)
-
-
-def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
-    """Beside the model of both campaigns: every candidate in the new one, and in each run of the
-    reference; waves and steps in all of its runs.
+def _unexplained(screening: Screening, model: Model) -> dict[Shape, float]:
+    """Log Bayes factor of every function, and of every family of waves or steps, averaged over
+    where they may be.
     """
-    problem, stack = screening.problem, screening.problem.stack
-    projection = model.fitted.projection(screening.surrogates)
-    effects = _signatures(problem, model, problem.stack.rig.effects, everywhere=True)
-    smooth = smooth_signatures(stack, everywhere=True)
-    both = list(whitened(problem.noise, chain(effects, smooth)))
+    beside = without_harmonics(screening.problem, model.fitted)
+    out = {family.shape: family.average(beside) for family in screening.families}
 
-    alone = projection.of_rows(~stack.new)  # what is new must not tell what is usual
-    usual = habits(alone, both, stack)
-
-    for s in both:  # in their place: together they are large
-        s.signature.columns[~stack.new] = 0.0
-        s.columns[~stack.new] = 0.0
-    beside = without_harmonics(problem, model.fitted, screening.surrogates)
-    searched = {family.shape: family.average(beside) for family in screening.families}
-    screen = screen_signatures(projection, [lambda: both], searched)
-
-    of_reference = families(stack, problem.noise, ~stack.new)
-    rest = beside.of_rows(~stack.new)
-    shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
-    ripples = {name for name, effect in stack.rig.effects.items() if order_of(effect)}
-    return screen.beside_reference({**shapes, **usual}, asked(stack), ripples)
+    functions = screening.beyond_form
+    if functions:
+        columns = whiten(screening.problem.noise, np.column_stack([s.columns for s in functions]))
+        a, b = model.fitted.projection().project(columns)
+        out |= {s.shape: _of(a, b, own) for s, own in _spans(functions)}
+    return out
 
 
-def asked(stack: Stack) -> float:
-    """Evidence that must be left beside what the rig does anyway [nats]: where that has transients,
-    whose law is never quite the rig's, as much as of campaigns alone.
-    """
-    shown = {c.parameter[0] for c in stack.rig.constants if c.kind == HAD}
-    had = [effect for name, effect in stack.rig.effects.items() if name in shown]
-    kinds = [*had, *(type(effect) for effect in stack.rig.baseline)]
-    passing = any(effect.in_steady_states() is None for effect in kinds)
-    return TUNING.screen.sure if passing else TUNING.screen.beside_reference
+def _spans(functions: Sequence[Signature]) -> list[tuple[Signature, slice]]:
+    ends = np.cumsum([s.columns.shape[1] for s in functions]).tolist()
+    return [
+        (s, slice(end - s.columns.shape[1], end)) for s, end in zip(functions, ends, strict=True)
+    ]
 
 
-def chance_of(
-    screening: Screening, model: Model, searched: Collection[Shape]
-) -> dict[Shape, float]:
-    """Chance by noise alone of the evidence that families of waves or steps have beside a model."""
-    beside = without_harmonics(screening.problem, model.fitted, screening.surrogates)
-    averages = {f.shape: f.average(beside) for f in screening.families if f.shape in searched}
-    return {shape: tail_chance(mean[1:], float(mean[0])) for shape, mean in averages.items()}
-
-
-def _signatures(
-    problem: Problem, model: Model, names: Iterable[str], everywhere: bool = False
-) -> Iterator[Signature]:
-    """Signatures of some effects about the model's fit; everywhere: in the reference campaign
-    too.
-    """
-    stack, fitted = problem.stack, model.fitted
-
-    for effect in (stack.rig.effects[name] for name in names):
-        tried = list(shape_grid(stack.rig, effect))
-        prior = -np.log(max(len(tried), 1))
-        for fixed in _worth(problem, model, effect, tried):
-            made = signature(
-                stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting, everywhere
-            )
-            if made is not None:
-                yield replace(made, prior=prior)
-
-
-def _worth(
-    problem: Problem, model: Model, effect: type[Effect], tried: list[dict[str, float]]
-) -> list[dict[str, float]]:
-    """What to simulate: of ripples only those that the residual holds, the others' evidence being
-    nil.
-    """
-    order = order_of(effect)
-    if order is None or len(tried) <= TUNING.screen.loudest:
-        return tried
-
-    orders = sorted({fixed[order] for fixed in tried})
-    loud = loudest(problem.stack, problem.noise, model.fitted.residual, orders)
-    return [fixed for fixed in tried if fixed[order] in loud]
-
-
-def _strains(problem: Problem, model: Model) -> Iterator[Signature]:
-    """Every constant off by more than is known of it: a misfit that it takes is said."""
-    for number, constant in enumerate(problem.stack.rig.constants):
-        columns = TUNING.screen.strained * model.fitted.raw[:, number : number + 1]
-        if np.any(columns):
-            shape = Shape(constant.name, (constant.name,), "strain")
-            yield Signature(shape, columns, (0,), {})
-
-
-def _open(screening: Screening, model: Model, screen: Screen, jobs: int = 1) -> float:
-    """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
-    the search. What surprises most with one colour need not be what slow noise cannot be, so all
-    are weighed.
-
-    jobs: processes.
-    """
-    chosen = _standing_out(screening, model, screen)
-    if not chosen:
-        return np.inf
-
-    most = -np.inf
-    for some in some_of(chosen):
-        weighed = OpenNoise(screening.problem, model.fitted, some, jobs)
-        for number in range(len(some)):
-            most = max(most, weighed.gain(number))
-            if most > TUNING.screen.sure:
-                return most
-    return most
-
-
-def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
-    """The evidence of what is new with the sizes of what the rig does anyway open [nats]."""
-    if not screen.stands_out:
-        return np.inf
-    every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
-    return gain_with_form_open(screening.problem, model, every)
-
-
-def _covered(screening: Screening) -> float:
-    """Share of the new campaign that the reference covers; all where no form varies."""
-    stack = screening.problem.stack
-    return covered_share(stack) if stack.rig.forms else 1.0
-
-
-def _standing_out(screening: Screening, model: Model, screen: Screen) -> list[Signature]:
-    """The candidates that stand out, the most surprising first, each as it is likeliest."""
-    every = {**screen.best, **_peaks(screening, model, screen)}
-    return [every[of] for of in screen.stands_out if of in every]
-
-
-def _peaks(screening: Screening, model: Model, screen: Screen) -> dict[Candidate, Signature]:
-    """Of the waves and steps that stand out each where it is likeliest."""
-    outstanding = set(screen.stands_out)
-    searched = [f for f in screening.families if f.shape in outstanding]
-    peaks = candidates(searched, screening.problem, model.fitted)
-    return {s.shape.family: s for s in reversed(peaks)}
+def _of(a: Array, b: Array, own: slice) -> float:
+    return float(log_bayes(a[own, own], b[own], (0,) * (own.stop - own.start)))

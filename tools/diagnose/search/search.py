@@ -1,5 +1,9 @@
-"""From the screen to models: nonlinear fits of the likely effects, one more at a time, earlier ones
-re-tested.
+"""From one pass to models: nonlinear fits of the likely effects, then of pairs and of triples.
+
+A pass (screen/evidence.py) tells by linear algebra which effects may explain the recordings. The
+likeliest are fitted. Beside the best two fits, and then beside the best pair, another pass tells
+what one more effect would gain. Each effect of the best model must stand: the model is fitted
+without each, from where it stands.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from itertools import chain
 import numpy as np
 
 from gritd.estimator.effects.base import order_of
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
@@ -18,26 +23,28 @@ from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.screen.screening import Screening, screen_of_base, with_form_open
-from gritd.tools.diagnose.search.promises import Promise, promises
+from gritd.tools.diagnose.screen.evidence import Pass, Weighed, pass_beside, varied_pass
+from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
+from gritd.tools.diagnose.search.calibration import Calibration, learnt
 from gritd.tools.diagnose.tuning import TUNING
 
+TURNING = "wheel_angle"  # what an effect that ripples goes with
 FURTHER = {1: "second", 2: "third"}  # effect, beside so many
 
 
 @dataclass(frozen=True)
 class Search:
-    """All models that were fitted, and the screen beside the base model.
+    """All models that were fitted, and the screen beside the bare model.
 
-    models: the base model first, exact in its form; then the base model with the form's learnt
-        discrepancy, where there is a mismatch; then those with effects.
+    models: the base model first, exact in its form; then the bare model, with the discrepancy of
+        form that the recordings ask for; then those with effects.
+    failed: effects whose fit ended in a numerical failure.
     """
 
     screening: Screening
     models: tuple[Model, ...]
     first: Screen
-    failed: tuple[tuple[str, ...], ...] = ()  # effects whose fit ended in a numerical failure
+    failed: tuple[tuple[str, ...], ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -51,17 +58,22 @@ class Search:
     @property
     def bare(self) -> Model:
         """Without effects, with the discrepancy of form that the recordings ask for."""
-        return self.models[1] if len(self.models) > 1 else self.models[0]
+        return self.models[1]
 
-    def news(self, model: Model) -> float:
-        """Log evidence beyond what a reference campaign shows of the model's effects [nats]."""
-        usual = sum(self.first.habit.get(name, 0.0) for name in model.names)
-        return float(model.evidence - TUNING.screen.habit * usual)
+    @property
+    def calibration(self) -> Calibration:
+        """How far evidence is to be trusted here."""
+        stack = self.problem.stack
+        return learnt(len(stack.rig.effects), stack.referred)
+
+    def gain(self, model: Model) -> float:
+        """Log evidence above the bare model's [nats]."""
+        return float(model.evidence - self.bare.evidence)
 
     def weight(self, model: Model) -> float:
-        """Log evidence and log prior of so many effects, above the bare model's [nats]."""
-        more = np.log(TUNING.search.odds / max(len(self.problem.stack.rig.effects), 1))
-        return float(self.news(model) - self.bare.evidence + max(len(model.names) - 1, 0) * more)
+        """Log weight of a model against the bare one, by the prior of so many effects."""
+        evidence, count = np.array([self.gain(model)]), np.array([len(model.names)])
+        return float(self.calibration.weights(evidence, count, np.zeros(1))[0])
 
     def sized(self, size: int) -> list[Model]:
         """Models of so many effects, the likeliest first."""
@@ -69,7 +81,7 @@ class Search:
 
     def best(self) -> Model:
         """The likeliest model with effects, or the bare one."""
-        return max(self.models[1:] or self.models, key=self.weight)
+        return max(self.models[1:], key=self.weight)
 
     def has(self, names: Collection[str]) -> bool:
         return any(set(m.names) == set(names) for m in self.models)
@@ -78,33 +90,29 @@ class Search:
 def search_models(
     screening: Screening, step: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> Search:
-    """Forward steps from the base model if the screen alarms; each from the best few models of the
-    step before.
+    """Forward steps from the bare model if the screen alarms.
 
     jobs: processes that fit.
     """
     step("screening every effect")
     search = begin(screening, jobs)
     give_back()  # of all that was screened
-    bare = _bare(search, search.base)
-    first = with_form_open(screening, bare, search.first)
-    search = replace(search, models=(search.base, bare), first=first)
     if not search.first.alarmed:
         return search
 
     tell = counting(step, "fitting the likely effects")
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
-    if search.problem.stack.referred:
-        tell = counting(step, "looking beside what the reference tells by itself")
-        search = extended(search, [search.base], TUNING.search.effects_later, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
-    for size in range(1, TUNING.search.most_effects):
-        starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
-        if starts:
-            names = ", or ".join(" and ".join(m.names) for m in starts)
+    later = zip(TUNING.search.starts, TUNING.search.effects_later, strict=True)
+    for size, (starts, most) in enumerate(later, start=1):
+        if size == TUNING.search.most_effects:
+            break
+        begun = search.sized(size)[:starts]
+        if begun:
+            names = ", or ".join(" and ".join(m.names) for m in begun)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
-            search = extended(search, starts, TUNING.search.effects_later, jobs, tell)
+            search = extended(search, begun, most, jobs, tell)
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
@@ -113,44 +121,50 @@ def search_models(
 
 
 def begin(screening: Screening, jobs: int = 1) -> Search:
-    """The base model and its screen."""
-    base = screening.base
-    return Search(screening, (base,), screen_of_base(screening, jobs))
+    """The base model, the bare one, and what stands out beside it."""
+    bare = _bare(screening, screening.base)
+    return Search(screening, (screening.base, bare), screen(screening, bare, jobs))
 
 
-def _bare(search: Search, start: Model) -> Model:
+def _bare(screening: Screening, start: Model) -> Model:
     """The model without effects from the constants of another, its discrepancy learnt."""
-    screening = search.screening
     sizes = start.sizes or tuple(0 for _ in screening.forms)
     begins = (start.fitted.u, np.zeros(0))
     return fit_model(screening.problem, screening.forms, (), (), begins, sizes, near=start.fitted)
-
-
-def _the_better(models: Sequence[Model]) -> Iterator[Model]:
-    """The first two, and of the others the likeliest of each set of effects."""
-    best: dict[frozenset[str], Model] = {}
-    for model in models[2:]:
-        of = frozenset(model.names)
-        if of not in best or model.evidence > best[of].evidence:
-            best[of] = model
-    return chain(models[:2], best.values())
 
 
 def _settled(search: Search) -> Search:
     """With the bare model fitted again from where the best effect found its constants: no model may
     be worse than one that it holds.
     """
-    again = _bare(search, search.best())
+    again = _bare(search.screening, search.best())
     if again.evidence <= search.bare.evidence:
         return search
     return replace(search, models=(search.base, again, *search.models[2:]))
 
 
-def _near(search: Search, model: Model) -> bool:
-    return search.weight(model) > search.weight(search.best()) - TUNING.search.little
-
-
 # ---- one more effect ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Promise:
+    """An effect beside a model: its log evidence by linear algebra, of the model with it [nats],
+    and where its fit begins.
+    """
+
+    model: Model
+    evidence: float
+    starts: tuple[Weighed, ...]
+
+    @property
+    def effect(self) -> str:
+        of = self.starts[0].signature.of
+        assert isinstance(of, str)
+        return of
+
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset((*self.model.names, self.effect))
 
 
 def extended(
@@ -160,40 +174,78 @@ def extended(
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
 ) -> Search:
-    """With fits of each of some models and one more effect, so many of each at most, but no two of
-    the same effects.
+    """With fits of some models and one more effect, the likeliest by linear algebra; no two of the
+    same effects.
 
     tell: is told how many of how many fits are done; of none before their number is known.
     """
     tell(0, 0)
-    wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
-    for model in starts:
-        every = promises(search.problem, search.first, model, jobs)
-        least = _least_promise(model, every)
-        candidates = [p for p in every if p.gain > least]
-        fresh = [(frozenset((*model.names, p.effect.name)), p) for p in candidates]
-        fresh = [(names, p) for names, p in fresh if names not in wanted and not search.has(names)]
-        wanted |= {names: (model, promise) for names, promise in fresh[:most]}
+    every = [p for model in starts for p in _promises(search, model, jobs)]
+    wanted: dict[frozenset[str], Promise] = {}
+    for promise in sorted(every, key=lambda p: -p.evidence):
+        if len(wanted) < most and not search.has(promise.names):
+            wanted.setdefault(promise.names, promise)
 
-    def fitted(of: tuple[Model, Promise]) -> Model | None:
+    def fitted(promise: Promise) -> Model | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return attempted(lambda: _with_effect(search, *of))
+            return attempted(lambda: _with_effect(search, promise))
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
-    models = (*search.models, *(model for model in made if model is not None))
     told = zip(wanted.values(), made, strict=True)
-    failed = tuple((*start.names, p.effect.name) for (start, p), model in told if model is None)
+    failed = tuple((*p.model.names, p.effect) for p, model in told if model is None)
+    models = (*search.models, *(model for model in made if model is not None))
     return replace(search, models=models, failed=(*search.failed, *failed))
 
 
-def _least_promise(model: Model, every: Sequence[Promise]) -> float:
-    """What an effect must gain by linear algebra beside a model to be fitted [nats]: a share of the
-    best, which a fit may turn round; one more effect also some of what the verdict asks of it.
-    """
+def _promises(search: Search, model: Model, jobs: int) -> list[Promise]:
+    """Effects that gain enough beside a model: a share of the best, which a fit may turn round."""
+    first = search.first.effects
+    if model is search.bare:
+        beside = varied_pass(search.problem, model, first, jobs)
+    else:
+        beside = pass_beside(search.problem, model, first)
+
+    names = list(beside.effects)
+    if not search.first.on_grid:  # a ripple alone raised the alarm
+        effects = search.problem.stack.rig.effects
+        names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
+    top = max((beside.gain(name) for name in names), default=0.0)
     alone = TUNING.search.little if model.names else TUNING.search.promising
-    top = max((promise.gain for promise in every), default=0.0)
-    return max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
+    least = max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
+    likely = [name for name in names if beside.gain(name) > least]
+    return [
+        Promise(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
+        for n in likely
+    ]
+
+
+def _starts(search: Search, model: Model, beside: Pass, name: str) -> tuple[Weighed, ...]:
+    """The likeliest shape of an effect; beside the bare model of one with edges along the bed also
+    others, elsewhere.
+    """
+    every = beside.effects[name]
+    edges = any(
+        p.scan and p.unit == "m" for p in search.problem.stack.rig.effects[name].parameters()
+    )
+    if model.names or not edges:
+        return tuple(every[:1])
+    apart = _apart(every)[: TUNING.search.elsewhere]
+    return tuple(one for one in apart if one.evidence > beside.alone) or tuple(every[:1])
+
+
+def _apart(ranked: Sequence[Weighed]) -> list[Weighed]:
+    """Of shapes that were tried, the likeliest first, those that are not beside a likelier one in
+    the grid.
+    """
+    tried = [one.signature.fixed for one in ranked]
+    grid = {name: sorted({fixed[name] for fixed in tried}) for name in tried[0]}
+    places = [np.array([grid[name].index(fixed[name]) for name in grid]) for fixed in tried]
+    return [
+        one
+        for number, one in enumerate(ranked)
+        if all(np.abs(places[number] - other).max() > 1 for other in places[:number])
+    ]
 
 
 def counting(step: Callable[[str], None], what: str) -> Callable[[int, int], None]:
@@ -207,52 +259,51 @@ def shared(search: Search) -> list[object]:
     return [*allowed, *search.screening.forms, *search.models]
 
 
-def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
+def _with_effect(search: Search, promise: Promise) -> Model:
     """The model with one more effect, the best of its starts. Where it ends well below the model
     that it holds, it has lost its way: it is fitted again from there, with the effect's strengths
     at nought.
     """
-    every = [_fitted_with(search, model, start) for start in (promise, *promise.others)]
-    made = max(every, key=lambda m: m.evidence)
+    model, effect = promise.model, search.problem.stack.rig.effects[promise.effect]
+    begins = [(one.start, one.sizes) for one in promise.starts]
+    made = max((_fitted_with(search, promise, *b) for b in begins), key=lambda m: m.evidence)
     if made.evidence > model.evidence - TUNING.search.little:
         return made
 
-    strengths = [p.role == "strength" for p in promise.effect.parameters()]
-    none = replace(promise, start=np.where(strengths, 0.0, promise.start), sizes=model.sizes)
-    return max(made, _fitted_with(search, model, none), key=lambda m: m.evidence)
+    strengths = [p.role == "strength" for p in effect.parameters()]
+    none = np.where(strengths, 0.0, promise.starts[0].start)
+    again = _fitted_with(search, promise, none, model.sizes)
+    return max(made, again, key=lambda m: m.evidence)
 
 
-def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
-    fitted, screening = model.fitted, search.screening
-    effects: tuple[Maker, ...] = (*fitted.effects, promise.effect)
-    free = (*fitted.free, *_free_near(search.problem.stack.rig, promise))
-    begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
-
-    return fit_model(
-        screening.problem,
-        screening.forms,
-        effects,
-        free,
-        begins,
-        promise.sizes,
-        model.other_forms,
-        fitted,
-    )
+def _fitted_with(search: Search, promise: Promise, start: Array, sizes: tuple[int, ...]) -> Model:
+    """start (p,) of the effect's parameters; sizes: of the forms."""
+    fitted, screening = promise.model.fitted, search.screening
+    effect = search.problem.stack.rig.effects[promise.effect]
+    effects: tuple[Maker, ...] = (*fitted.effects, effect)
+    free = (*fitted.free, *_free_near(search.problem.stack.rig, promise.effect, start))
+    begins = (fitted.u, np.concatenate((fitted.x, start)))
+    forms, bends = screening.forms, promise.model.other_forms
+    return fit_model(screening.problem, forms, effects, free, begins, sizes, bends, fitted)
 
 
-def _free_near(rig: Rig, promise: Promise) -> tuple[Free, ...]:
-    """The parameters of a promised effect. Its ripples a turn stay as near to where they begin as
-    the longest run resolves: farther off they are another ripple, and spectra at the recordings'
-    own rate were searched for those.
+def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
+    """The parameters of an effect. Its ripples a turn stay as near to where they begin as the
+    longest run resolves: farther off they are another ripple, and spectra at the recordings' own
+    rate were searched for those.
     """
-    order, near = order_of(promise.effect), resolved_order(rig)
+    effect = rig.effects[name]
+    order, near = order_of(effect), resolved_order(rig)
     free = []
-    for known, x in zip(free_of((promise.effect,)), promise.start.tolist(), strict=True):
+    for known, x in zip(free_of((effect,)), start.tolist(), strict=True):
         p, value = known.parameter, known.value(x)
         if p.name == order:
             p = replace(p, low=max(p.low, value - near), high=min(p.high, value + near))
         free.append(replace(known, parameter=p))
     return tuple(free)
+
+
+# ---- one effect less ---------------------------------------------------------------------------
 
 
 def _retested(search: Search, best: Model, jobs: int) -> Search:
@@ -268,6 +319,16 @@ def _retested(search: Search, best: Model, jobs: int) -> Search:
     made = each(jobs, less, best.names, shared(search))
     again = [model for model in made if model is not None]
     return replace(search, models=tuple(_the_better((*search.models, *again))))
+
+
+def _the_better(models: Sequence[Model]) -> Iterator[Model]:
+    """The first two, and of the others the likeliest of each set of effects."""
+    best: dict[frozenset[str], Model] = {}
+    for model in models[2:]:
+        of = frozenset(model.names)
+        if of not in best or model.evidence > best[of].evidence:
+            best[of] = model
+    return chain(models[:2], best.values())
 
 
 def without(search: Search, model: Model, name: str) -> Model:

@@ -118,6 +118,7 @@ class Explain:
 
     # --- traces.py ---
     pictures: int = tuned(4, "scatters", "at most")
+    digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
 
     # --- ripples.py ---
     one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that are told as one")

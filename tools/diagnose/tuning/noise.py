@@ -37,9 +37,6 @@ class Noise:
     fast_shares: tuple[float, ...] = tuned(
         (0.0, 0.4, 0.9), "share", "of the rest that the fast part takes, as tried"
     )
-    surrogate_colours: int = tuned(
-        20, "colours", "drawn from the posterior of the colour for the surrogates", "run time"
-    )
     ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
     least_freedom: int = tuned(3, "values", "beside the mean's columns that tell a size, at least")
     steady: float = tuned(

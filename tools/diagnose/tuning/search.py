@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from gritd.tools.diagnose.tuning.field import tuned
 
-TESTBEDS = "of ten testbeds with one effect left out, one or two have a second that shows"
-
 
 @dataclass(frozen=True)
 class Search:
@@ -15,17 +13,18 @@ class Search:
 
     effects_first: int = tuned(7, "effects", "fitted beside the base model", "run time")
     effects_quick: int = tuned(3, "effects", "fitted for a first answer", "run time")
-    effects_later: int = tuned(5, "effects", "fitted beside a model with effects", "run time")
-    starts: int = tuned(2, "models", "of a size from which the next step starts", "run time")
+    starts: tuple[int, ...] = tuned(
+        (2, 1), "models", "of one effect, of two, beside which one more is looked for", "run time"
+    )
+    effects_later: tuple[int, ...] = tuned(
+        (4, 2), "models", "of two effects, of three, that are fitted", "run time"
+    )
     most_effects: int = tuned(3, "effects", "of a model, at most", "run time")
     again: int = tuned(
         4, "signatures", "of an effect tried beside a model: the screen's likeliest", "run time"
     )
     elsewhere: int = tuned(
         4, "starts", "of a fit whose effect has edges, at other places", "run time"
-    )
-    curved: float = tuned(
-        0.1, "share", "of an effect's linear evidence by which its fit may do better"
     )
     little: float = tuned(
         8.0,
@@ -35,10 +34,6 @@ class Search:
         "far below the model that it holds begins anew",
         "run time",
     )
-    same: float = tuned(
-        1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
-    )
-    varied: float = tuned(-2.3, "nats", "log prior of an effect that varies along the bed")
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
     promised_share: float = tuned(
         0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
@@ -49,4 +44,3 @@ class Search:
         0.02, "expected sizes", "of a strength that has a sign: at its bound it has no slope"
     )
     farthest_start: float = tuned(20.0, "expected sizes", "of any parameter")
-    odds: float = tuned(0.15, "odds", "of one more effect, shared by all candidates", TESTBEDS)

@@ -21,7 +21,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.search.promises import TURNING
+from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 PASSING = {*BEYOND_FORM, TURNING}

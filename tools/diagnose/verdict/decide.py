@@ -16,14 +16,14 @@ from scipy.special import logsumexp
 
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
+from gritd.tools.diagnose.fit.evidence import log_bayes_expected
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
-from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.screen.screening import Screen
+from gritd.tools.diagnose.search.calibration import Calibration
 from gritd.tools.diagnose.search.search import Search, counting, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
-from gritd.tools.diagnose.verdict.breadth import Breadth
-from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, Weighed
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 from gritd.tools.diagnose.verdict.resemblance import trusted
@@ -42,15 +42,12 @@ def decide(search: Search, jobs: int = 1, step: Callable[[str], None] = lambda _
         return Decision(verdict, search.bare, 0.0, None, _quiet(search, screen), 0.0, {})
 
     step("weighing what has no name")
-    evidence = Breadth(search, jobs).evidence()
-    best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
+    best, by = search.best(), search.calibration
     beside = _beside(search, [search.bare, best] if best.names else [search.bare], jobs)
     if beside.get(best) is not None:  # what pays beside the best may pay beside its rivals
         tell = counting(step, "weighing what has no name")
-        beside |= _beside(search, _rivals(search, evidence, best), jobs, tell)
-
-    by = learnt(len(search.problem.stack.rig.effects), search.problem.stack.referred)
-    return judged(search, trusting(search, weigh(search, evidence, beside), by), beside, by)
+        beside |= _beside(search, _rivals(search, best), jobs, tell)
+    return judged(search, trusting(search, weigh(search, beside), by), beside, by)
 
 
 def _beside(
@@ -69,33 +66,24 @@ def _beside(
     return dict(zip(models, made, strict=True))
 
 
-def _rivals(search: Search, evidence: Mapping[Model, float], best: Model) -> list[Model]:
+def _rivals(search: Search, best: Model) -> list[Model]:
     """The likeliest models of as many effects as the best one, and of fewer."""
-    weight = {m: search.weight(m) - search.news(m) + evidence[m] for m in search.models[1:]}
-    standing = sorted((m for m in weight if np.isfinite(weight[m])), key=lambda m: -weight[m])
-    rivals = []
-    for size in range(1, len(best.names) + 1):
-        rivals += [m for m in standing if len(m.names) == size][: TUNING.verdict.rivals]
+    sizes = range(1, len(best.names) + 1)
+    rivals = [m for size in sizes for m in search.sized(size)[: TUNING.verdict.rivals]]
     return [m for m in rivals if m is not best]
 
 
-def weigh(
-    search: Search,
-    evidence: Mapping[Model, float],
-    beside: Mapping[Model, Nameless | None],
-) -> list[Weighed]:
+def weigh(search: Search, beside: Mapping[Model, Nameless | None]) -> list[Weighed]:
     """All explanations with their evidence [nats above the bare model].
 
-    evidence: of every model, as it counts (breadth.py); beside: functions without a name beside
-    some of them, the bare one among these.
+    beside: functions without a name beside some of the models, the bare one among these.
     """
-    bare = search.bare.evidence
-    standing = [m for m in search.models[1:] if np.isfinite(evidence[m])]
-    every = [Weighed(m, m.names, False, evidence[m] - bare) for m in standing]
+    every = [Weighed(m, m.names, 0, search.gain(m)) for m in search.models[1:]]
     for model, nameless in beside.items():
         if nameless is not None:
-            gain = (evidence[model] if model.names else bare) - bare + nameless.gain
-            every.append(Weighed(nameless.model, model.names, True, gain))
+            gain = search.gain(model) + nameless.gain
+            count = len(nameless.functions)
+            every.append(Weighed(nameless.model, model.names, count, gain))
     return every
 
 
@@ -111,7 +99,7 @@ def judged(
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
         np.array([len(w.names) for w in weighed]),
-        np.array([float(w.nameless) for w in weighed]),
+        np.array([w.functions for w in weighed]),
     )
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
@@ -246,12 +234,12 @@ def _unlisted(weighed: Sequence[Weighed]) -> float:
 
 def _quiet(search: Search, screen: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: of each effect by the screen's evidence, against none."""
-    listed, count = screen.listed, len(search.problem.stack.rig.effects)
-    by = learnt(count, search.problem.stack.referred)
-    prior = np.log(TUNING.search.odds / max(count, 1))
-    weights = np.array([0.0, *(prior + e / by.temperature for e in listed.values())])
+    listed = [n for n in screen.effects.effects]
+    gains = np.array([screen.effects.gain(name) for name in listed])
+    prior = np.log(TUNING.verdict.odds / max(len(search.problem.stack.rig.effects), 1))
+    weights = np.array([*(prior + gains / search.calibration.temperature), 0.0])
     shares = np.exp(weights - logsumexp(weights))
-    return dict(zip(listed, shares[1:].tolist(), strict=True))
+    return dict(zip(listed, shares.tolist(), strict=False))
 
 
 def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:
@@ -281,10 +269,8 @@ def power(search: Search, screen: Screen) -> float:
     """
     projection = search.base.fitted.projection()
     seen = []
-    for name, likeliest in screen.best.items():
-        if isinstance(name, str):
-            a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
-            gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(screen.seen(name, float(gain)))
+    for likeliest in screen.best.values():
+        a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
+        seen.append(screen.seen(likeliest.prior + log_bayes_expected(np.diag(a))))
 
     return sum(seen) / max(len(search.problem.stack.rig.effects), 1)

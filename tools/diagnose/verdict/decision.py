@@ -17,7 +17,7 @@ class Weighed:
     """An explanation and its evidence above the bare model's [nats].
 
     names:    listed effects; none for the discrepancy of form alone.
-    nameless: whether functions without a name act beside them.
+    functions: how many functions without a name act beside them.
     share:    of the misfit that the effects take.
     trust:    of each effect, the probability that it is there and nothing that resembles it, if
         this explanation is the best.
@@ -25,11 +25,16 @@ class Weighed:
 
     model: Model
     names: tuple[str, ...]
-    nameless: bool
+    functions: int
     evidence: float
     probability: float = 0.0
     share: float = 0.0
     trust: tuple[float, ...] = ()
+
+    @property
+    def nameless(self) -> bool:
+        """Whether functions without a name act beside the effects."""
+        return self.functions > 0
 
     @property
     def trusts(self) -> dict[str, float]:

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
 from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.screen.scans import without_harmonics
-from gritd.tools.diagnose.screen.screen import whitened
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -72,10 +73,10 @@ def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]
     if not functions:
         return [], 0.0
     projection = without_harmonics(screening.problem, model.fitted)
-    ready = list(whitened(screening.problem.noise, functions))
-    a, b = projection.project(np.column_stack([w.columns for w in ready]))
-    ends = np.cumsum([w.columns.shape[1] for w in ready])
-    parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
+    columns = np.column_stack([s.columns for s in functions])
+    a, b = projection.project(whiten(screening.problem.noise, columns))
+    ends = np.cumsum([0, *(s.columns.shape[1] for s in functions)]).tolist()
+    parts = [np.arange(first, last) for first, last in pairwise(ends)]
     prior = np.array([s.prior for s in functions]) - np.log(len({s.of for s in functions}))
 
     total, chosen = 0.0, list[int]()

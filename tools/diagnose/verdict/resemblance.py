@@ -4,12 +4,12 @@ Either may have been there: the effect in some published form, or other physics 
 be bent to. Both explain the recordings by the same functions, so at any form error h, the share by
 which the formula is bent, their likelihood L(h) is one. They differ by what is expected. Published
 laws of an effect differ little, so its prior over h has hardly anything at the last size; what only
-resembles it mostly needs that. What is there takes most of the misfit, what resembles it any share
-s of it. With the share λ of explanations that mislead (calibration.py)
+resembles it mostly needs that. What is there takes nearly all of the misfit, what resembles it a
+lesser share s. With the share λ of explanations that mislead (calibration.py)
 
-    P(effect) = Σ L(h) (1 − λ) p(h | effect) p(s | effect) / Σ L(h) [(that) + λ p(h | other)]
+    P(effect) = Σ L(h) (1 − λ) p(h, s | effect) / Σ L(h) [(that) + λ p(h, s | other)]
 
-and p(s | effect) = 4 s³ against 1. L is not tempered as evidence between explanations is: both
+where p(h, s | …) = p(h | …) k sᵏ⁻¹. L is not tempered as evidence between explanations is: both
 priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
 of it h says nothing.
 """
@@ -22,9 +22,10 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.search.promises import TURNING
+from gritd.tools.diagnose.search.calibration import Calibration
+from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.verdict.calibration import Calibration
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 
 def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[float, ...]:
@@ -36,10 +37,15 @@ def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[floa
 
 def believed(likelihood: Array, share: float, lapse: float) -> float:
     """Probability that an effect is there. likelihood (h,): of each size of its form error."""
-    power = TUNING.verdict.share_power
     own, other = np.array(TUNING.verdict.form_own), np.array(TUNING.verdict.form_other)
-    there = (1.0 - lapse) * power * share ** (power - 1.0) * float(likelihood @ own)
-    return float(there / (there + lapse * float(likelihood @ other)))
+    there = (1.0 - lapse) * _of_share(share, TUNING.verdict.share_power) * float(likelihood @ own)
+    alike = lapse * _of_share(share, TUNING.verdict.share_power_other) * float(likelihood @ other)
+    return float(there / max(there + alike, SPAN))
+
+
+def _of_share(share: float, power: float) -> float:
+    """Density of a share of the misfit."""
+    return float(power * share ** (power - 1.0))
 
 
 def _likelihood(rig: Rig, model: Model, name: str) -> Array:

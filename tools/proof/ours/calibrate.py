@@ -28,7 +28,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.guard import guarded
-from gritd.tools.diagnose.verdict.calibration import Calibration, table_of
+from gritd.tools.diagnose.search.calibration import Calibration, table_of
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 

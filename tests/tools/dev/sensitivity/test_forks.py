@@ -28,7 +28,7 @@ NUMBERS = (
     "noise.floor",
     "fit.strength_prior",
     "screen.level",
-    "search.odds",
+    "search.promising",
     "verdict.together",
     "explain.slight_explanation",
 )
@@ -44,7 +44,7 @@ def small(folder: Path, handed: Handed) -> DiagnosisOutcome:
 
 @pytest.fixture(autouse=True, scope="module")
 def _quick() -> Iterator[None]:
-    with replaced("search", effects_first=1, most_effects=1), replaced("screen", nulls=100):
+    with replaced("search", effects_first=1, most_effects=1):
         yield
 
 
@@ -89,24 +89,24 @@ def test_a_child_does_not_end_while_its_number_is_still_read(tmp_path: Path) -> 
     """The first room hands on the same; the number counts in the second."""
 
     def late(folder: Path, handed: Handed) -> DiagnosisOutcome:
-        assert TUNING.search.odds > 0.0
+        assert TUNING.verdict.odds > 0.0
         handed("the same")
-        tan_phi = TUNING.search.odds
+        tan_phi = TUNING.verdict.odds
         handed(tan_phi)
         return DiagnosisOutcome("consistent", tan_phi=tan_phi, sigma=1.0)
 
-    odds = Field("search", "odds")
+    odds = Field("verdict", "odds")
     (line,) = _kept(tmp_path, late, odds, read_by(late, tmp_path))
     assert line["after"]["tan_phi"] == pytest.approx(0.3)
 
 
 def test_a_number_that_breaks_a_diagnosis_is_said(tmp_path: Path) -> None:
     def breaks(folder: Path, handed: Handed) -> DiagnosisOutcome:
-        if TUNING.search.odds > 0.2:
+        if TUNING.verdict.odds > 0.2:
             raise TypeError
         return DiagnosisOutcome("consistent")
 
-    (line,) = _kept(tmp_path, breaks, Field("search", "odds"))
+    (line,) = _kept(tmp_path, breaks, Field("verdict", "odds"))
     assert line["after"]["verdict"] == "failed: TypeError"
 
 
@@ -115,14 +115,14 @@ def test_children_end_with_a_run_that_is_interrupted(tmp_path: Path) -> None:
     parent, read, write = os.getpid(), *os.pipe()
 
     def stops(folder: Path, handed: Handed) -> DiagnosisOutcome:
-        assert TUNING.search.odds
+        assert TUNING.verdict.odds
         if os.getpid() != parent:
             os.close(read)
             os.read(os.pipe()[0], 1)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        _kept(tmp_path, stops, Field("search", "odds"), jobs=2)
+        _kept(tmp_path, stops, Field("verdict", "odds"), jobs=2)
     os.close(write)
     assert os.read(read, 1) == b""  # the child's end is closed, too
     os.close(read)

@@ -13,14 +13,14 @@ from gritd.tools.dev.sensitivity.page import by_hand, page
 from gritd.tools.dev.sensitivity.runs import DiagnosedRuns, run
 from gritd.tools.diagnose.tuning import TUNING
 
-LEVEL, ODDS, KINDS = Field("screen", "level"), Field("search", "odds"), Field("screen", "kinds")
+LEVEL, ODDS, KINDS = Field("screen", "level"), Field("verdict", "odds"), Field("screen", "kinds")
 
 
 def stub(folder: Path, handed: Handed) -> DiagnosisOutcome:
     """Its verdict hangs on the level of the screen, tan φ on the odds, nothing on the kinds."""
     explained = TUNING.screen.level > 0.0075
-    tan_phi = 0.5 + TUNING.search.odds
-    assert TUNING.screen.sure > 0.0
+    tan_phi = 0.5 + TUNING.verdict.odds
+    assert TUNING.screen.kinds > 0.0
     verdict, names = ("explained", ("loss",)) if explained else ("consistent", ())
     return DiagnosisOutcome(verdict, names, {"loss": 0.75 if explained else 0.5}, tan_phi, 0.1)
 
@@ -40,8 +40,8 @@ def test_the_table_names_the_campaigns_whose_verdict_changes(tmp_path: Path) -> 
     text = page(finished(tmp_path))
     row = next(line for line in text.splitlines() if line.startswith("| `screen.level`"))
     assert row == "| `screen.level` | 0.01 | 2 | 1: a ½ | 1: a ½ | 0.25 | 0.00 |"
-    row = next(line for line in text.splitlines() if line.startswith("| `search.odds`"))
-    assert row == "| `search.odds` | 0.15 | 2 | 0 | 0 | 0.00 | 1.50 |"
+    row = next(line for line in text.splitlines() if line.startswith("| `verdict.odds`"))
+    assert row == "| `verdict.odds` | 0.15 | 2 | 0 | 0 | 0.00 | 1.50 |"
     assert "Of 3 numbers, 1 change a verdict or its names somewhere: 1 of 6 diagnoses." in text
     assert "1 numbers moved nothing, to the last digit, in any diagnosis" in text
     assert "how many there were): `screen.kinds` (2)." in text
@@ -54,7 +54,7 @@ def test_a_table_that_is_not_finished_says_so(tmp_path: Path) -> None:
     text = page(runs, campaigns=["a", "b"])
     assert "partial: 2 of 6 diagnoses" in text
     assert "Not begun: `b`." in text
-    assert "Not run yet: `screen.kinds`, `search.odds`." in text
+    assert "Not run yet: `screen.kinds`, `verdict.odds`." in text
 
 
 def test_what_a_person_wrote_stays(tmp_path: Path) -> None:

@@ -33,8 +33,7 @@ PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
 
 
 def prepared(rig: WheelRig) -> Screening:
-    rng = np.random.default_rng(0)
-    return prepare_screening(fit_base(rig, rng), rng)
+    return prepare_screening(fit_base(rig))
 
 
 def explained(screening: Screening, effect: Effect) -> Model:

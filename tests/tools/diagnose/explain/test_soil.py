@@ -71,7 +71,7 @@ def _fitted() -> tuple[Problem, Model]:
     shown = ConfiguredEffect("bulldozing", {"share": Uncertain(1.0, 1.0)})
     runs = record(plan(seconds=24.0), (make("bulldozing", {"share": 1.0}),))
     rig = WheelRig(runs, settings()).having((shown,))
-    base = fit_base(rig, np.random.default_rng(0))
+    base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
     none = tuple(0 for _ in forms)
     return base.problem, sized_model(base.problem, forms, (base.fitted.u, np.zeros(0)), none)

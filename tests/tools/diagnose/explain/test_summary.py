@@ -5,15 +5,15 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from gritd.tools.diagnose.explain.result import Fit, Location
 from gritd.tools.diagnose.explain.summary import summary, worse
-from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.screen.evidence import Pass
+from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.verdict.decision import Resembled
 
-SCREEN = Screen({"a": 9.0}, {"a": (0.0, 1.0)}, {}, {}, np.zeros(300))
+SCREEN = Screen(Pass(9.0, {}), {}, 0.0, False, 1.0, 0.0)
 RIG: Any = SimpleNamespace(new=[True])
 PLACE = Location("torque", "speed", 0.9, 0.003, 0.003, "Torque, 0.3 N·m more than the model")
 

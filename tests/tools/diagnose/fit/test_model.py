@@ -26,7 +26,7 @@ def shifted() -> BaseFit:
     """A stress peak three expected sizes off: without the effect, constants are strained far."""
     acting = (make("stress_peak_shift", {"share": -0.3}),)
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
-    return fit_base(rig, np.random.default_rng(0))
+    return fit_base(rig)
 
 
 @pytest.mark.parametrize("start", [(-3.0, 0.0), (4.5, 0.8), (-5.0, 5.0)])
@@ -53,7 +53,7 @@ def test_a_fit_stands_where_its_evidence_is_told() -> None:
     """
     acting = (make("slip_sinkage", {"growth": 0.4}),)
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
-    base = fit_base(rig, np.random.default_rng(0))
+    base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
 
     effects = (EFFECTS["sinkage_gain"],)
@@ -74,7 +74,7 @@ def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() ->
     both = (EFFECTS["side_slip"], EFFECTS["pulley_slip"])
     acting = (make("side_slip", {"angle": 0.3}),)
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
-    base = fit_base(rig, np.random.default_rng(0))
+    base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
 
     begins, sizes = (base.fitted.u, np.array([0.5, 2.0])), tuple(0 for _ in forms)

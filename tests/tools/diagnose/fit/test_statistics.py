@@ -27,14 +27,11 @@ from gritd.tools.diagnose.noise.colour import (
     _recursion,
     coloured,
     covariance,
-    innovation_variance,
     products_of_innovations,
-    surrogates,
     unit_whitener,
 )
 from gritd.tools.diagnose.noise.estimate import restricted
 from gritd.tools.diagnose.noise.saturated import saturated_mean
-from gritd.tools.diagnose.screen.screen import tail_quantile
 from gritd.tools.diagnose.tuning import TUNING, replaced
 
 GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
@@ -95,7 +92,7 @@ def _noise_of_three_runs(uncertain: Array, rougher: Array | float = 1.0) -> Nois
     )
     colour = Colour(2.0, 0.5, 0.6, 0.3)
     nothing = np.zeros((GAPS.size, 0))
-    return Noise(cast(Any, stack), (colour,), ((colour,),), uncertain, nothing, rougher)
+    return Noise(cast(Any, stack), (colour,), uncertain, nothing, rougher)
 
 
 def test_what_is_uncertain_of_single_values_is_white_noise_beside_slow_noise() -> None:
@@ -111,22 +108,6 @@ def test_what_is_uncertain_of_single_values_is_white_noise_beside_slow_noise() -
 
     root = noise.whitener.toarray()
     np.testing.assert_allclose(root @ expected @ root.T, np.eye(GAPS.size), atol=1e-3)
-
-    drawn = surrogates(noise, 4000, np.random.default_rng(8))
-    near = slice(296, 308)
-    sample = np.cov(drawn[near])
-    np.testing.assert_allclose(sample, expected[near, near], atol=0.1 * np.diag(expected).max())
-    np.testing.assert_allclose(sample[0, 1:4], expected[296, 297:300], rtol=0.15)
-    assert np.var(drawn[460]) == pytest.approx(36.0, rel=0.1)
-
-
-def test_colours_of_equal_innovations_are_told_by_the_usual_innovation() -> None:
-    tried = [Colour(1.0, 2.0, 0.99), Colour(1.0, 0.5, 0.0)]
-    noise = coloured(GAPS, 200, tried[0], np.random.default_rng(9))
-    slow, white = innovation_variance(GAPS, tried)
-    step = np.diff(noise[:200], axis=0)
-    assert white == pytest.approx(1.0)
-    assert slow == pytest.approx(np.var(step), rel=0.15)
 
 
 def test_a_stretch_touches_the_innovations_in_which_it_weighs_and_none_of_another_run() -> None:
@@ -242,11 +223,6 @@ def test_strain_against_the_prior_is_evidence() -> None:
     column = 300.0 * direction[:, None]
     assert log_bayes(*strained.project(column), (0,)) > 5.0
     assert log_bayes(*relaxed.project(column), (0,)) < 0.0
-
-
-def test_tail_quantile_of_an_exponential() -> None:
-    values = np.random.default_rng(4).exponential(1.0, 4000)
-    assert tail_quantile(values, 0.01) == pytest.approx(np.log(100.0), rel=0.1)
 
 
 def test_json_has_no_nan() -> None:

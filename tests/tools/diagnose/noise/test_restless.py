@@ -23,7 +23,7 @@ def stack() -> Stack:
 def _noise(stack: Stack) -> Noise:
     colours = tuple(Colour(1.0, 1.0, 0.0) for _ in stack.rig.channels)
     nothing = np.zeros((stack.size, 0))
-    return Noise(stack, colours, tuple((c,) for c in colours), np.zeros(stack.size), nothing)
+    return Noise(stack, colours, np.zeros(stack.size), nothing)
 
 
 def _white(stack: Stack) -> Array:

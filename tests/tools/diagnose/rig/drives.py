@@ -60,9 +60,7 @@ def rig(series: dict[str, Series]) -> DriveRig:
 def fitted(made: DriveRig) -> dict[str, float]:
     stack = Stack(made)
     effects = [EFFECTS[name] for name in EFFECTS_OF_FRICTION]
-    noise = Noise(
-        stack, (Colour(0.1, 0.5, 0.0),), ((),), np.zeros(stack.size), np.zeros((stack.size, 0))
-    )
+    noise = Noise(stack, (Colour(0.1, 0.5, 0.0),), np.zeros(stack.size), np.zeros((stack.size, 0)))
     problem = Problem(stack, noise, np.zeros((stack.size, 0)))
     found = problem.descend(
         effects, free_of(effects), np.zeros(len(made.constants)), np.array([1.0, 0.1])

@@ -11,7 +11,8 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.load_error import changes_of, error_of_level
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.screen.screening import prepare_screening, screen_of_base
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -69,6 +70,5 @@ def test_slow_noise_of_the_measured_load_raises_no_alarm(noise: float, seed: int
     rig = WheelRig(runs, settings())
     assert "load" not in rig.channels
 
-    draws = np.random.default_rng(0)
-    base = fit_base(rig, draws)
-    assert not screen_of_base(prepare_screening(base, draws)).alarmed
+    base = fit_base(rig)
+    assert not begin(prepare_screening(base)).first.alarmed

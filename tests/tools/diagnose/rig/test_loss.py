@@ -58,7 +58,7 @@ def test_an_idle_motor_is_compared_without_the_axles_sensor() -> None:
         np.testing.assert_array_equal(run.measured["torque"][idle], motor[idle])
         assert np.array_equal(run.used["axle_torque"] & resting, idle)
 
-    noise = fit_base(rig, np.random.default_rng(0)).problem.noise
+    noise = fit_base(rig).problem.noise
     stack = noise.stack
     own = stack.of("torque")
     assert noise.loose[own & stack.idle].max() < 0.8 * np.median(noise.loose[own & ~stack.idle])

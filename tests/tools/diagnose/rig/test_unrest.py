@@ -80,7 +80,7 @@ def test_a_fit_knows_the_noise_of_the_wheels_speed() -> None:
     """Its columns hold both moving parts, and their weight says that the wheel's unrest is noise
     and that the carriage's is not.
     """
-    base = fit_base(_noisy_rig([]), np.random.default_rng(0))
+    base = fit_base(_noisy_rig([]))
     stack = base.problem.stack
     assert stack.unrest.shape == (stack.size, 2)
     wheel, _ = base.fitted.slack[base.problem.allowance.count - 2 :]
@@ -99,7 +99,7 @@ def _evidence(base: BaseFit, effect: Maker, free: tuple[Free, ...]) -> float:
 def rubbing() -> BaseFit:
     """The base fit of a rig whose drive loses 0.05 N·m, driven at one speed."""
     rig = _noisy_rig([make("coulomb_friction", {"loss": 0.05})])
-    return fit_base(rig, np.random.default_rng(0))
+    return fit_base(rig)
 
 
 def test_friction_that_falls_with_speed_has_no_more_evidence_than_friction_at_one_speed(

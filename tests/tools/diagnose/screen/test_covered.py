@@ -4,17 +4,12 @@ last.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.screen import screening
 from gritd.tools.diagnose.screen.covered import _held, covered_share
-from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -36,20 +31,3 @@ def test_a_reference_at_a_far_lighter_load_covers_nothing(light: float, share: f
     after = record(plan(seed=3, loads=(60.0, 60.0, 60.0)), ())
     rig = WheelRig([*before, *after], settings(), len(before), "same")
     assert covered_share(Stack(rig)) == pytest.approx(share, abs=0.05)
-
-
-@pytest.mark.parametrize(("share", "alarms"), [(1.0, True), (0.3, False)])
-def test_a_new_ripple_counts_by_the_covered_share(
-    share: float, alarms: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    quiet = Screen({"loss": 0.0}, {"loss": (0.0, 1.0)}, {}, {}, np.zeros(300))
-    given: Any = {
-        "_screen_beside_reference": quiet, "_covered": share, "_open_form": 0.0, "_ripple": 1e-6,
-        "strain_of": 0.0,
-    }  # fmt: skip
-    for name, value in given.items():
-        monkeypatch.setattr(screening, name, lambda *_, value=value: value)
-
-    referred = SimpleNamespace(stack=SimpleNamespace(referred=True))
-    of_pair: Any = SimpleNamespace(problem=referred, base=None, surrogates=None)
-    assert screening.screen_of_base(of_pair).alarmed == alarms

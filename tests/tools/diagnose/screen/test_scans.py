@@ -22,7 +22,6 @@ from gritd.tools.diagnose.noise.colour import Colour, coloured
 from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.scans import candidates
-from gritd.tools.diagnose.screen.screen import tail_chance
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.proof.ours.cases import record
@@ -80,28 +79,18 @@ def test_a_line_is_no_noise() -> None:
     assert np.var(left) < 0.1 * np.var(line)
 
 
-def test_the_chance_of_a_value_goes_on_beyond_the_count() -> None:
-    nulls = -np.log((np.arange(300) + 0.5) / 300)
-    assert tail_chance(nulls, 1.0) == pytest.approx(np.exp(-1.0), rel=0.02)
-    assert tail_chance(nulls, 7.0) == pytest.approx(np.exp(-7.0), rel=0.2)
-    assert tail_chance(nulls, 50.0) == pytest.approx(
-        0.1 / 301
-    )  # so far out nothing is known of the tail
-
-
 @cache
 def begun(effect: type[Effect] | None, size: float) -> Search:
     """The search after its first screen."""
     drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
     rig = WheelRig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)
-    rng = np.random.default_rng(0)
-    return begin(prepare_screening(fit_base(rig, rng), rng))
+    return begin(prepare_screening(fit_base(rig)))
 
 
 def test_a_machine_next_door_is_heard_with_its_period() -> None:
     search = begun(NextDoor, 0.3)
     assert search.first.alarmed
-    assert search.first.largest[0] == Shape("drawbar_pull", ("time",), "wave")
+    assert search.first.largest == Shape("drawbar_pull", ("time",), "wave")
     place = locate(search.screening, search.base)[0]
     assert (place.channel, place.covariate) == ("drawbar_pull", "time")
     assert "oscillates with a period of 1.70 s, ± 0.29 N" in place.where

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-
 from gritd.tools.diagnose.explain.result import Diagnosis, Discrepancy
-from gritd.tools.diagnose.screen.screen import Screen
 from tests.tools.diagnose.campaigns import diagnosed, plan, soil
 
 
@@ -34,14 +30,6 @@ def test_a_constant_within_what_is_known_of_it_is() -> None:
     assert found.verdict == "consistent"
     assert found.share == 0.0
     assert all(d.size > 0.0 and d.learnt_from == "recordings" for d in _formed(found))
-
-
-@pytest.mark.parametrize(("strain", "alarms"), [(3.4, False), (4.5, True)])
-def test_beyond_four_sigma_nothing_is_consistent(strain: float, alarms: bool) -> None:
-    """However well slow noise may explain what stands out beside it."""
-    found = Screen({"loss": 0.0}, {"loss": (0.0, 1.0)}, {}, {}, np.zeros(300), open=0.0)
-    told = replace(found, strain=strain)
-    assert told.alarmed == alarms and (told.p < 0.01) == alarms
 
 
 def _formed(found: Diagnosis) -> list[Discrepancy]:

@@ -78,9 +78,8 @@ def test_the_reference_alone_is_its_runs_and_a_campaign_without_one_has_none() -
 def decided(*effects: Effect, quick: bool = True) -> tuple[WheelRig, Decision]:
     """On a campaign without a reference."""
     rig = WheelRig(record(plan(seed=3), effects), settings())
-    rng = np.random.default_rng(0)
     with first_answer() if quick else nullcontext():
-        return rig, decide(search_models(prepare_screening(fit_base(rig, rng), rng)))
+        return rig, decide(search_models(prepare_screening(fit_base(rig))))
 
 
 def test_a_lag_lasts_if_nothing_could_stand_in_its_place() -> None:

@@ -25,33 +25,19 @@ from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict import decide, resemblance
-from gritd.tools.diagnose.verdict.calibration import learnt
 from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth, main, read
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.other_forms import HessSoomFriction
 from tests.tools.diagnose.campaigns import plan, settings
 
 
-def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:
-    """Six nats on a function that slow noise imitates say less than five on one that it cannot."""
-    found = Screen(
-        {"drift": 6.0, "friction": 5.0},
-        {"drift": (4.0, 5.0), "friction": (0.2, 1.0)},
-        {},
-        {},
-        np.zeros(300),
-    )
-    assert found.largest[0] == "friction"
-    assert found.surprise("drift") < 1.0 < found.threshold < found.surprise("friction")
-
-
 def _model(acting: Sequence[Effect], name: str) -> Model:
     """A listed effect fitted to recordings in which something acts."""
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
-    base = fit_base(rig, np.random.default_rng(0))
+    base = fit_base(rig)
     free = free_of((EFFECTS[name],))
     start = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
     return fit_model(base.problem, (), (EFFECTS[name],), free, (base.fitted.u, start), ())
@@ -109,9 +95,9 @@ def _judged(listed: float, nameless: float, trust: float, monkeypatch: pytest.Mo
     bare, best = Fit(()), Fit(("a",))
     search: Any = SimpleNamespace(bare=bare, screening=None)
     weighed: Any = [
-        decide.Weighed(bare, (), False, 0.0),
-        decide.Weighed(best, ("a",), False, listed, 0.0, 0.9, (trust,)),
-        decide.Weighed(bare, (), True, nameless),
+        decide.Weighed(bare, (), 0, 0.0),
+        decide.Weighed(best, ("a",), 0, listed, 0.0, 0.9, (trust,)),
+        decide.Weighed(bare, (), 1, nameless),
     ]
     return decide.judged(search, weighed, {}, learnt(30))
 
@@ -140,8 +126,8 @@ def test_no_name_is_stated_that_is_less_likely_than_none(monkeypatch: pytest.Mon
     by, names = learnt(30), "abc"
     bare, every = Fit(()), [Fit((name,)) for name in names]
     even = by.temperature * (by.nameless - by.listed + np.log(30))
-    listed = [decide.Weighed(cast(Any, fit), fit.names, False, even - 1.0) for fit in every]
-    none = decide.Weighed(cast(Any, bare), (), True, 0.0)
+    listed = [decide.Weighed(cast(Any, fit), fit.names, 0, even - 1.0) for fit in every]
+    none = decide.Weighed(cast(Any, bare), (), 1, 0.0)
     found = decide.judged(
         cast(Any, SimpleNamespace(bare=bare, screening=None)), [none, *listed], {}, by
     )
@@ -156,8 +142,8 @@ def test_of_equals_the_simplest_comes_first(monkeypatch: pytest.MonkeyPatch) -> 
     search: Any = SimpleNamespace(bare=bare, screening=None)
     for more, first in ((1.0, "plain"), (20.0, "richer")):
         weighed: Any = [
-            decide.Weighed(richer, richer.names, False, 900.0 + more),
-            decide.Weighed(plain, plain.names, False, 900.0),
+            decide.Weighed(richer, richer.names, 0, 900.0 + more),
+            decide.Weighed(plain, plain.names, 0, 900.0),
         ]
         assert decide.judged(search, weighed, {}, learnt(30)).best.names == (first,)
 
@@ -178,8 +164,8 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     by = learnt(30)
     weighed: Any = [
-        decide.Weighed(bare, (), True, 900.0 - by.temperature * by.nameless),
-        decide.Weighed(one, ("a",), False, 900.0 - by.temperature * (by.listed - np.log(30))),
+        decide.Weighed(bare, (), 1, 900.0 - by.temperature * by.nameless),
+        decide.Weighed(one, ("a",), 0, 900.0 - by.temperature * (by.listed - np.log(30))),
         decide.Weighed(
             two,
             ("a", "b"),
@@ -196,13 +182,13 @@ def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     alone: Any = [
-        decide.Weighed(one, ("a",), False, 900.0),
-        decide.Weighed(two, ("a", "b"), False, 905.0),
-        decide.Weighed(two, ("a", "b"), True, 1005.0),
+        decide.Weighed(one, ("a",), 0, 900.0),
+        decide.Weighed(two, ("a", "b"), 0, 905.0),
+        decide.Weighed(two, ("a", "b"), 1, 1005.0),
     ]
     search: Any = SimpleNamespace(bare=bare, screening=None)
     assert decide.judged(search, alone, {}, learnt(30)).best is two
-    alone.append(decide.Weighed(one, ("a",), True, 1000.0))
+    alone.append(decide.Weighed(one, ("a",), 1, 1000.0))
     assert decide.judged(search, alone, {}, learnt(30)).best is one
 
 

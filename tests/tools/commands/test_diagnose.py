@@ -224,4 +224,4 @@ def test_progress_never_goes_back(referred: bool, monkeypatch: pytest.MonkeyPatc
         step(what)
     step("holding out runs and conditions")
     assert shares == sorted(shares) and 0.9 < shares[-1] < 1.0
-    assert len(set(shares)) >= len(shares) - 1
+    assert len(set(shares)) >= len(shares) - (2 if referred else 1)  # all fits done, the next begun

@@ -10,7 +10,7 @@ from gritd.tools.dev.manual.outputs import Printed
 from gritd.tools.dev.manual.page import EXIT_CODES, ManualPage
 
 MARKUP = re.compile(r"([*_<>\[\]$\\])")
-LONGEST = 60  # lines of an output
+KEPT = 30  # lines of a long output, at either end
 
 
 def reference(of: Mapping[str, ManualPage], printed: Mapping[str, Printed]) -> dict[str, str]:
@@ -51,8 +51,9 @@ def _example(name: str, printed: Printed) -> Iterator[str]:
 
 
 def _cut(lines: list[str]) -> list[str]:
-    left_out = len(lines) - LONGEST
-    return lines if left_out <= 0 else [*lines[:LONGEST], f"… {left_out} more lines"]
+    """Beginning and end of a long output."""
+    left_out = len(lines) - 2 * KEPT
+    return lines if left_out <= 0 else [*lines[:KEPT], f"… {left_out} lines …", *lines[-KEPT:]]
 
 
 def _entries(page: ManualPage) -> Iterator[str]:

@@ -22,7 +22,8 @@ PASSING = (
         re.compile(r"\b(gritd|python|numpy|filterpy|scipy) \d+\.\d+(\.\d+)?[a-z0-9.]*"),
         r"\1 VERSION",
     ),
-    (re.compile(r"\b(machine|tick_revision) \w+"), r"\1 VERSION"),
+    (re.compile(r"\bmachine [^,]+(, glibc [\d.]+)?"), "machine VERSION"),
+    (re.compile(r"\btick_revision \w+"), "tick_revision VERSION"),
 )
 
 

@@ -132,7 +132,7 @@ def test_a_diagnosis_draws_itself_in_a_notebook(tmp_path):
 
 
 def test_an_estimate_that_is_not_believed_says_so():
-    """A friction that the filter knows nothing of: what is told is the prior."""
+    """A friction that the filter knows nothing of: what is reported is the prior."""
     run = gritd.simulate(schedule=STEPS, effects={"coulomb_friction": {"loss": 1.0}}, seed=3)
     estimates = gritd.Filter(packaged()).run(run.arrays)
     assert not estimates.believed and "not believed: " in repr(estimates)

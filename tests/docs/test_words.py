@@ -26,14 +26,12 @@ PATTERNS = {
     re.compile(rf"\b{words}\b".replace(" ", r"\s+"), re.I): better for words, better in OUT.items()
 }
 GENERATED = {ROOT / "docs/proof.md"}  # quotes verdicts of recordings as they were printed
-DIAGNOSIS = {ROOT / "docs" / name for name in ("diagnosis.md", "from-recording-to-verdict.md")}
 TEXTS = sorted(
     path
     for place in ("docs", "config", "drivers", "estimator", "tools", "gritd/interface")
     for path in (ROOT / place).rglob("*")
     if path.suffix in (".md", ".py", ".yaml", ".html", ".js", ".c", ".pyi")
-    and path not in GENERATED | DIAGNOSIS
-    and "diagnose" not in path.parts
+    and path not in GENERATED
     and "decisions" not in path.parts
 )
 

@@ -1,4 +1,4 @@
-"""The disk fills, goes read-only or hangs, parts are deleted, and the daemon is told to end."""
+"""The disk fills, goes read-only or hangs, parts are deleted, and the daemon is reported to end."""
 
 from __future__ import annotations
 

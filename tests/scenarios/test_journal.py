@@ -133,7 +133,7 @@ FAULTS = {
 @pytest.mark.parametrize("scale", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FAULTS)
 def test_it_is_said(tmp_path, name, scale, figure):
-    """All that the daemon counted is told, and in few lines."""
+    """All that the daemon counted is reported, and in few lines."""
     fault = FAULTS[name]
     changes = narrow() if name == "wraps" else {}
     with service(tmp_path, driven(90.0, 1, skip=1.0), **changes) as (wires, daemon):

@@ -48,7 +48,7 @@ def test_the_soil_stays_the_same(runs, figure):
 
 @pytest.mark.parametrize("loss", [0.4, 0.8])
 def test_a_loss_that_nobody_stated(seed, loss, figure):
-    """A drive that loses more torque than any soil explains [N·m]: what is told is the prior."""
+    """A drive that loses more torque than any soil explains [N·m]: the prior is reported."""
     settings = changes.packaged_rig()
     case = changes.case(settings, "none", seed)
     tracker = Tracker(case.settings)

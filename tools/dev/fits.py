@@ -40,14 +40,14 @@ from gritd.tools.cli.command import CommandError, Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import Ground, Problem
+from gritd.tools.diagnose.fit.problem import EffectsObjective, Problem
 from gritd.tools.diagnose.method import accustomed, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.blind.handover import NEW, REFERENCE
 from gritd.tools.proof.ours.cases import draw, record, scaled
@@ -75,7 +75,7 @@ class Compared:
 # ---- one fit -----------------------------------------------------------------------------------
 
 
-def deciding(search: Search) -> list[Model]:
+def deciding(search: EffectSearch) -> list[Model]:
     """The models whose evidence can change a verdict: the bare one and those near the best."""
     if len(search.models) < 2:
         return [search.base]
@@ -84,7 +84,7 @@ def deciding(search: Search) -> list[Model]:
     return list(dict.fromkeys([search.bare, *near]))
 
 
-def problem_of(search: Search, model: Model) -> Problem:
+def problem_of(search: EffectSearch, model: Model) -> Problem:
     """The recordings, with what the model's fit was allowed."""
     if model.marginal is None:
         return search.problem
@@ -120,7 +120,7 @@ def standing(problem: Problem, model: Model) -> float:
     return problem.ground(fitted.effects, fitted.free).tried(fitted.centre)[1]
 
 
-def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
+def _residuals(ground: EffectsObjective, problem: Problem, centre: Array) -> Array:
     """All whose squares are the objective: values, what is allowed, and strains."""
     tried, nats = ground.tried(centre)
     weights = ground.penalty[: centre.size]
@@ -130,7 +130,7 @@ def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
     return np.concatenate((left, tried.slack, weights * centre))
 
 
-def _slopes(ground: Ground, problem: Problem, centre: Array) -> Array:
+def _slopes(ground: EffectsObjective, problem: Problem, centre: Array) -> Array:
     """Their derivatives; what is allowed follows every move, so it is eliminated exactly."""
     own = ground.linearised(ground.tried(centre)[0]).own
     follows = cho_solve((problem.root, True), problem.allowance.pulled(own), check_finite=False)
@@ -138,7 +138,9 @@ def _slopes(ground: Ground, problem: Problem, centre: Array) -> Array:
     return np.vstack((-left, -follows, np.diag(ground.penalty[: centre.size])))
 
 
-def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -> list[Compared]:
+def compared(
+    case: str, search: EffectSearch, starts: int, rng: np.random.Generator
+) -> list[Compared]:
     """Every fit of a search that decides, from where it ended and from so many points about it."""
     rows = []
 

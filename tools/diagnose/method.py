@@ -31,7 +31,7 @@ from gritd.tools.diagnose.noise.estimate import estimate
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.diagnose.verdict.anyway import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
@@ -51,7 +51,7 @@ def diagnose(
     """Everything `gritd diagnose` says of a rig's recordings. Nothing is drawn: the same recordings
     give the same result.
 
-    seed, redo: kept in the result; step: is told what begins; jobs: processes that fit; quick: a
+    seed, redo: kept in the result; step: is given what begins; jobs: processes that fit; quick: a
     first answer, for which only the likeliest effects are fitted, each alone.
     """
     kept = {**(redo or {}), "seed": seed}
@@ -103,7 +103,7 @@ def accustomed(
     return rig.having(had_anyway(alone, decision)), decision.verdict
 
 
-def _searched(rig: Rig, step: Callable[[str], None], jobs: int) -> Search:
+def _searched(rig: Rig, step: Callable[[str], None], jobs: int) -> EffectSearch:
     base = fit_base(rig, jobs)
     give_back()
     return search_models(prepare_screening(base), step, jobs)

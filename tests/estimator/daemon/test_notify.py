@@ -1,4 +1,4 @@
-"""What a service manager is told, and what happens where it does not listen."""
+"""What a service manager is reported, and what happens where it does not listen."""
 
 from __future__ import annotations
 

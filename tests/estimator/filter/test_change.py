@@ -1,4 +1,4 @@
-"""A change of the soil is told from a wrong calibration and from noise."""
+"""A change of the soil is reported from a wrong calibration and from noise."""
 
 from __future__ import annotations
 

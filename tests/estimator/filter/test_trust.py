@@ -79,7 +79,7 @@ def test_unrest_after_a_change_dies_down():
 
 
 def told(ticks):
-    """The ticks at which the prior is told."""
+    """The ticks at which the prior is reported."""
     return [t for t in ticks if t["flags"] & Flag.PRIOR]
 
 

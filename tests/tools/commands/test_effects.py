@@ -1,4 +1,4 @@
-"""`gritd effects`: every effect is listed, and one is told with all that is known of it."""
+"""`gritd effects`: every effect is listed, and one is reported with all that is known of it."""
 
 from __future__ import annotations
 

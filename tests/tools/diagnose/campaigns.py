@@ -87,6 +87,6 @@ def diagnosed(drawn: Plan, acting: Sequence[Effect] = ()) -> Diagnosis:
 
 
 def group(found: Diagnosis) -> set[str]:
-    """The first name and those it cannot be told apart from."""
+    """The first name and those it cannot be distinguished from."""
     first = found.hypotheses[0]
     return {first.effect, *first.indistinguishable_from}

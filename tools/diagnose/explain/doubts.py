@@ -55,7 +55,7 @@ def _loud(rig: Rig, noise: Noise) -> Iterator[str]:
             unit, factor = shown(rig.units[channel])
             found, of_reading = (spaced(s * factor, unit, 2) for s in (colour.sigma, stated))
             yield (
-                f"Louder than stated: the noise of {spelled(channel)} is {found},"
+                f"Noise exceeds the stated σ: the noise of {spelled(channel)} is {found},"
                 f" {fixed(colour.sigma / stated, 0)} times the stated noise of a reading,"
                 f" {of_reading}. What the model misses may be in it."
             )

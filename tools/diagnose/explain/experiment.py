@@ -21,12 +21,12 @@ from gritd.tools.diagnose.explain.result import NextExperiment
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Foreseen, Rig
-from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
-def next_experiment(search: Search, decision: Decision) -> NextExperiment | None:
+def next_experiment(search: EffectSearch, decision: Decision) -> NextExperiment | None:
     """None where model and recordings agree, or one explanation stands alone."""
     if decision.verdict == "insufficient":
         return _most_shown(_unseen_shown(search))
@@ -37,7 +37,7 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
     return _between(search, rivals) if len(rivals) > 1 else None
 
 
-def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
+def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     rig = search.problem.stack.rig
     gains = {key: _told_apart(search, rivals, key) for key in rig.menu.driven} | _measured(
@@ -91,7 +91,7 @@ def _by_hand(rig: Rig, names: Sequence[str]) -> NextExperiment | None:
 # ---- rivals ------------------------------------------------------------------------------------
 
 
-def _rivals(search: Search, decision: Decision) -> list[Model]:
+def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     best, groups = decision.best, decision.groups.values()
     same = [m for m in search.models if len(m.names) == len(best.names)]
     close = [m for m in same if any(set(m.names) - set(best.names) <= set(g) for g in groups)]
@@ -102,7 +102,7 @@ def _common(rivals: list[Model]) -> set[str]:
     return set.intersection(*(set(m.names) for m in rivals))
 
 
-def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
+def _told_apart(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
     """Expected gain between the first and every other rival [nats]."""
     rig = search.problem.stack.rig
     first, *others = rivals
@@ -153,7 +153,7 @@ def _read(rig: Rig, one: Model, other: Model, key: str) -> float:
 # ---- insufficient, and not in the list ---------------------------------------------------------
 
 
-def _unseen_shown(search: Search) -> dict[str, dict[str, float]]:
+def _unseen_shown(search: EffectSearch) -> dict[str, dict[str, float]]:
     """Of every driven experiment the gain for each effect that these recordings could not show
     [nats].
     """
@@ -174,7 +174,7 @@ def _unseen_shown(search: Search) -> dict[str, dict[str, float]]:
     return out
 
 
-def _not_shown(search: Search) -> list[str]:
+def _not_shown(search: EffectSearch) -> list[str]:
     """Effects that change nothing measured, or whose signature, at their expected size, is below
     the alarm.
     """
@@ -208,7 +208,7 @@ def _mistaken(decision: Decision) -> tuple[str, ...]:
     return names or (() if likeliest is None else (likeliest,))
 
 
-def _shape_of_misfit(search: Search, separates: tuple[str, ...]) -> NextExperiment | None:
+def _shape_of_misfit(search: EffectSearch, separates: tuple[str, ...]) -> NextExperiment | None:
     """A step of the condition along which the misfit lives, to tell some effects from it; the gain
     is its evidence so far, for as much again.
     """
@@ -225,7 +225,9 @@ def _shape_of_misfit(search: Search, separates: tuple[str, ...]) -> NextExperime
 # ---- what is foreseen --------------------------------------------------------------------------
 
 
-def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequence[Effect]) -> Array:
+def _slopes(
+    search: EffectSearch, key: str, here: Foreseen, u: Array, effects: Sequence[Effect]
+) -> Array:
     """Change of what is foreseen (values, q) for one σ of each soil constant as fitted so far."""
     rig = search.problem.stack.rig
     sigma = search.base.fitted.sigma
@@ -247,7 +249,7 @@ def _values(foreseen: Foreseen | None) -> Array:
     )
 
 
-def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float:
+def _gain(search: EffectSearch, here: Foreseen, change: Array, slopes: Array) -> float:
     """Half the squared change in units of noise, the soil's uncertainty among it [nats]."""
     stack = search.problem.stack
     sigma = []

@@ -39,13 +39,13 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
 from gritd.tools.diagnose.screen.screening import Screen
-from gritd.tools.diagnose.search.search import Search, without
+from gritd.tools.diagnose.search.search import EffectSearch, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
 def explain(
-    search: Search, decision: Decision, redo: Mapping[str, Any], jobs: int = 1
+    search: EffectSearch, decision: Decision, redo: Mapping[str, Any], jobs: int = 1
 ) -> Diagnosis:
     """The result object of a search that was decided. redo: what doing it again needs; jobs:
     processes.
@@ -110,7 +110,7 @@ def _test(screen: Screen) -> Test:
     return Test(first, screen.ratio, screen.threshold, screen.p, TUNING.screen.level, 0)
 
 
-def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
+def _located(search: EffectSearch, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
     """Where the misfit was made: told of the base model held at what was found beside the accepted
     effects.
     """
@@ -124,7 +124,7 @@ def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location
 
 
 def _hypotheses(
-    search: Search, decision: Decision, folds: Sequence[Bools]
+    search: EffectSearch, decision: Decision, folds: Sequence[Bools]
 ) -> tuple[Hypothesis, ...]:
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
@@ -155,7 +155,7 @@ def _hypotheses(
     return tuple(out)
 
 
-def _ranked(search: Search, decision: Decision) -> list[tuple[str, float]]:
+def _ranked(search: EffectSearch, decision: Decision) -> list[tuple[str, float]]:
     """Effects and their probabilities, the likeliest first; of accepted ones that are as likely the
     one first without which the evidence falls most.
     """
@@ -253,7 +253,7 @@ def _caveats(
     redo: Mapping[str, Any],
     failed: Sequence[Sequence[str]],
 ) -> tuple[str, ...]:
-    """Sentences on what to doubt; whole: the accepted model with functions without a name; failed:
+    """Sentences on what to doubt; whole: the accepted model with unexplained terms; failed:
     effects that no fit was had of.
     """
     rig = problem.stack.rig

@@ -1,4 +1,4 @@
-"""What is told of the reference that a campaign is held against."""
+"""What is reported of the reference that a campaign is held against."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from gritd.tools.diagnose.rig.interface import LawForm
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.scans import in_step
 from gritd.tools.diagnose.screen.screening import Screening
-from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decide import taken_share
 from gritd.tools.diagnose.verdict.nameless import nameless_functions
@@ -62,7 +62,7 @@ class Start:
     columns: Array
 
 
-def find_law(search: Search, model: Model, location: Sequence[Location]) -> FittedLaw | None:
+def find_law(search: EffectSearch, model: Model, location: Sequence[Location]) -> FittedLaw | None:
     """The law on top of a model; None where the rig or the channel has none."""
     stack = search.problem.stack
     form = stack.rig.law
@@ -190,7 +190,7 @@ def _edges(effect: type[Effect], domain: Domain) -> dict[str, float]:
 
 
 def _law(
-    search: Search,
+    search: EffectSearch,
     model: Model,
     start: Start,
     prefix: str,

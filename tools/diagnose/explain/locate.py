@@ -44,7 +44,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class CovariateFamily:
     """Functions of a covariate in one channel, with their columns in common with all others.
 
     nats: gained beyond chance; p: the chance of as many.
@@ -114,7 +114,7 @@ def _smooth_places(
     stack: Stack,
     residual: Array,
     projected: Projected,
-    families: list[Family],
+    families: list[CovariateFamily],
     points: changes.Changes,
 ) -> list[Place]:
     """In each channel the families that are taken up and survive."""
@@ -124,7 +124,7 @@ def _smooth_places(
         here = [f for f in families if f.shape.channel == channel]
         whole = projected.gain(_joined(here))[0]
 
-        told: list[Family] = []
+        told: list[CovariateFamily] = []
         for family in _taken_up(projected, here):
             before, told = projected.gain(_joined(told))[0], [*told, family]
             nats = projected.gain(_joined(told))[0] - before
@@ -138,7 +138,7 @@ def _smooth_places(
 
 def _families(
     screening: Screening, model: Model, projection: Projection, points: changes.Changes
-) -> tuple[Projected, list[Family]]:
+) -> tuple[Projected, list[CovariateFamily]]:
     """All smooth functions, steps at the change points of a covariate among them; and the likeliest
     waves.
 
@@ -165,7 +165,8 @@ def _families(
         np.union1d(own, means[shape.channel]) for shape, own in zip(shapes, spans, strict=True)
     ]
     families = [
-        Family(shape, own, *projected.gain(own)) for shape, own in zip(shapes, spans, strict=True)
+        CovariateFamily(shape, own, *projected.gain(own))
+        for shape, own in zip(shapes, spans, strict=True)
     ]
 
     chance = _chance_of(screening, model, [w.shape.family for w in waves])
@@ -237,8 +238,8 @@ def _turns(stack: Stack, own: Bools, orders: Array) -> Array:
 def _location(
     stack: Stack,
     residual: Array,
-    family: Family,
-    here: list[Family],
+    family: CovariateFamily,
+    here: list[CovariateFamily],
     points: changes.Changes,
     share: float,
     q: float,
@@ -262,7 +263,7 @@ def _location(
 # ---- which covariates --------------------------------------------------------------------------
 
 
-def _joined(families: list[Family]) -> Index:
+def _joined(families: list[CovariateFamily]) -> Index:
     """The columns of several families, each once."""
     return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(f.own for f in families)]))
 
@@ -278,10 +279,10 @@ def _chance_of(
     return {shape: float(np.exp(-max(mean, 0.0))) for shape, mean in averages.items()}
 
 
-def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
+def _taken_up(projected: Projected, families: list[CovariateFamily]) -> list[CovariateFamily]:
     """Families of a channel by evidence, each beside those before it and the mean they all hold."""
     mean = next((f for f in families if f.shape.along == ("constant",)), None)
-    taken: list[Family] = []
+    taken: list[CovariateFamily] = []
     best = 0.0
 
     while True:
@@ -300,7 +301,7 @@ def _adds(evidence: float, before: float) -> bool:
     return evidence >= before + least
 
 
-def _evidence(projected: Projected, families: list[Family]) -> float:
+def _evidence(projected: Projected, families: list[CovariateFamily]) -> float:
     if not families:
         return 0.0
     own = _joined(families)
@@ -321,7 +322,10 @@ def _false_discovery(p: Array) -> Array:
 
 
 def _ripples(
-    screening: Screening, projection: Projection, projected: Projected, families: list[Family]
+    screening: Screening,
+    projection: Projection,
+    projected: Projected,
+    families: list[CovariateFamily],
 ) -> list[Place]:
     """The strongest order of the wheel angle in each channel beside all smooth functions. A ripple
     in any channel by noise alone is as rare as the level of the screen.
@@ -352,7 +356,11 @@ def _ripples(
 
 
 def _beside_smooth(
-    screening: Screening, projection: Projection, channel: str, orders: Array, here: list[Family]
+    screening: Screening,
+    projection: Projection,
+    channel: str,
+    orders: Array,
+    here: list[CovariateFamily],
 ) -> Projected:
     """Ripples of every order (cosines, then sines) with all other functions of the channel
     projected out.

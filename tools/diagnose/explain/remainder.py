@@ -52,7 +52,7 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
     shares = {name: _share(stack.covariate(name)[own], left[own]) for name in known}
     name = max(shares, key=lambda n: shares[n])
     if shares[name] < TUNING.explain.remainder_share:
-        return f"{signed(mean, unit)} on average, along no condition"
+        return f"{signed(mean, unit)} on average, uncorrelated with any covariate"
 
     along = stack.covariate(name)[own]
     edges = np.quantile(along, np.linspace(0.0, 1.0, TUNING.explain.remainder_parts + 1))

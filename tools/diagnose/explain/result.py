@@ -38,7 +38,7 @@ class Test:
     statistic: the log likelihood ratio [nats], and the threshold it had to pass.
     p:         largest chance that noise alone could give of as much.
     level:     the false-alarm rate at which the threshold was set.
-    nulls:     simulations of noise that it was told by: none.
+    nulls:     simulations of noise that it rests on: none.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Hypothesis:
     score_nats: float = 0.0  # of its signature, before the nonlinear fit
     separated_by: Mapping[str, str] = field(
         default_factory=dict
-    )  # rival -> what would tell them apart, in words
+    )  # rival -> what would distinguish them, in words
     other_forms: float = 0.0
 
 
@@ -167,8 +167,8 @@ class Law:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """separates: effects that are told apart; of an unlisted misfit those that are told from it;
-    where the recordings were insufficient, those that would show.
+    """separates: effects that are distinguished; of an unlisted misfit those that are distinguished
+    from it; where the recordings were insufficient, those that would show.
 
     expected_probability: that of what is true, of two as likely now, after the expected gain.
     NaN: not foreseen.
@@ -257,7 +257,7 @@ class Late:
 @dataclass(frozen=True)
 class Explanation:
     """One of those that compete: listed effects, the discrepancy of form alone where there are
-    none, functions without a name beside them where `nameless`. evidence: [nats] above the
+    none, unexplained terms beside them where `nameless`. evidence: [nats] above the
     discrepancy alone.
     """
 

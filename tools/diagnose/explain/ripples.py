@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.tools.diagnose.explain.result import Late, Quantity, Ripple
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -20,7 +20,7 @@ def ripples_of(rig: Rig) -> tuple[Ripple, ...]:
     return tuple(_told(rig, line) for line in sorted(rig.lines.new, key=lambda x: x.p))
 
 
-def _told(rig: Rig, line: Line) -> Ripple:
+def _told(rig: Rig, line: SpectralLine) -> Ripple:
     return Ripple(
         line.channel,
         line.at,
@@ -81,7 +81,7 @@ def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
         yield f"The recordings vibrate, whatever the speed: {_listed(rig, vibrations)}."
 
 
-def _listed(rig: Rig, lines: Sequence[Line]) -> str:
+def _listed(rig: Rig, lines: Sequence[SpectralLine]) -> str:
     """The likeliest places with their channels, in words."""
     groups = _grouped(sorted(lines, key=lambda x: x.p))
     told = [_place(rig, group) for group in groups[: TUNING.explain.shown_lines]]
@@ -89,7 +89,7 @@ def _listed(rig: Rig, lines: Sequence[Line]) -> str:
     return "; ".join(told) + (f"; and {more} more" if more else "")
 
 
-def _place(rig: Rig, group: Sequence[Line]) -> str:
+def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:
     first = group[0]
     sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
     low, high = first.frequency
@@ -112,13 +112,13 @@ def _order(effect: Effect) -> float | None:
     return float(getattr(effect, name)) if name else 1.0
 
 
-def _taken(line: Line, orders: Sequence[float]) -> bool:
+def _taken(line: SpectralLine, orders: Sequence[float]) -> bool:
     return any(abs(line.at - order) < TUNING.orders.same * line.cell for order in orders)
 
 
-def _grouped(lines: Sequence[Line]) -> list[list[Line]]:
+def _grouped(lines: Sequence[SpectralLine]) -> list[list[SpectralLine]]:
     """Lines of several channels at one place together."""
-    groups: list[list[Line]] = []
+    groups: list[list[SpectralLine]] = []
     for line in lines:
         for group in groups:
             if abs(line.at - group[0].at) < TUNING.orders.same * line.cell:

@@ -1,5 +1,5 @@
-"""What is told of the soil: averaged over all explanations, of the new campaign where there is a
-reference.
+"""What is reported of the soil: averaged over all explanations, of the new campaign where there is
+a reference.
 """
 
 from __future__ import annotations

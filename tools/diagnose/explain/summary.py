@@ -89,13 +89,13 @@ def _worse(fit: Fit) -> Iterator[str]:
 
 
 def _alike(decision: Decision) -> Iterator[str]:
-    """Of each accepted name, what it cannot be told apart from."""
+    """Of each accepted name, what it cannot be distinguished from."""
     names = decision.best.names
     for name in names:
         if rivals := decision.groups.get(name):
             it = name if len(names) > 1 else "It"
             alike = ", ".join(sorted(rivals))
-            yield f"{it} cannot be told apart from {alike} with these recordings."
+            yield f"{it} cannot be distinguished from {alike} with these recordings."
 
 
 def _beside(decision: Decision) -> Iterator[str]:

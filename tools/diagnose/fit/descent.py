@@ -20,7 +20,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class CoordinateBounds:
     """Of every coordinate: low and high (n,)."""
 
     low: Array
@@ -45,7 +45,7 @@ class Bounds:
         return held
 
 
-class Place(Protocol):
+class DescentPoint(Protocol):
     """Where a descent stands: an objective in nats, its gradient (n,), its curvature (n, n)."""
 
     @property
@@ -65,16 +65,16 @@ class Place(Protocol):
         """(n, n)."""
 
 
-Here = TypeVar("Here", bound=Place)
-Linearised = TypeVar("Linearised", bound=Place, covariant=True)
+Here = TypeVar("Here", bound=DescentPoint)
+Linearised = TypeVar("Linearised", bound=DescentPoint, covariant=True)
 Tried = TypeVar("Tried")
 
 
-class Ground(Protocol[Linearised, Tried]):
+class Objective(Protocol[Linearised, Tried]):
     """What is descended."""
 
     @property
-    def bounds(self) -> Bounds: ...
+    def bounds(self) -> CoordinateBounds: ...
 
     @property
     def curved(self) -> Bools:
@@ -95,7 +95,7 @@ class Ground(Protocol[Linearised, Tried]):
 
 
 def descend(
-    ground: Ground[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
+    ground: Objective[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
 ) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one.
 
@@ -144,7 +144,7 @@ def descend(
 
 
 def _attempt(
-    ground: Ground[Here, Tried], here: Here, step: Array, foretold: float, damping: float
+    ground: Objective[Here, Tried], here: Here, step: Array, foretold: float, damping: float
 ) -> tuple[Tried, float, bool]:
     """Where a step (n,) leads, its share of the gain foretold [nats], and whether the step alone
     misses it because the valley is curved: then all that is not curved follows what is.
@@ -161,18 +161,20 @@ def _attempt(
     return (beside, (here.nats - lower) / foretold, True) if lower < nats else (tried, share, True)
 
 
-def _undamped_gain(here: Place, bounds: Bounds) -> float:
+def _undamped_gain(here: DescentPoint, bounds: CoordinateBounds) -> float:
     """What the step without damping would gain by the linearised function [nats]."""
     held = bounds.held(here.centre, here.gradient)
     return _gain(here, bounded_step(here, bounds, held, TUNING.fit.damping_least))
 
 
-def _gain(here: Place, step: Array) -> float:
+def _gain(here: DescentPoint, step: Array) -> float:
     """What a step would gain by the linearised function [nats]."""
     return float(-(here.gradient @ step + 0.5 * step @ here.curvature @ step))
 
 
-def bounded_step(here: Place, bounds: Bounds, held: Bools, damping: float) -> Array:
+def bounded_step(
+    here: DescentPoint, bounds: CoordinateBounds, held: Bools, damping: float
+) -> Array:
     """The damped step (n,) that leaves no bound: coordinates that would are put on theirs."""
     held, step = held.copy(), np.zeros(here.centre.size)
     low, high = bounds.low - here.centre, bounds.high - here.centre

@@ -138,7 +138,7 @@ class Marginal:
 
     def moments(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance (w, w) of the unknowns numbered `wanted` (w,), averaged
-        likewise. The weights of a freedom are told times its size: 0 where it does not act.
+        likewise. The weights of a freedom are given times its size: 0 where it does not act.
         """
         ordered, weight = self._weighed(chosen)
         told = [

@@ -211,7 +211,7 @@ def _places(freedoms: Sequence[Freedom]) -> list[tuple[str, int]]:
 
 def with_forms_had(problem: Problem, model: Model) -> Model:
     """The same fit where what the reference shows by itself may have other forms than ours, as the
-    model's effects have: for what is told of soil and form. A search has none of it.
+    model's effects have: for what is reported of soil and form. A search has none of it.
     """
     if model.marginal is None:
         return model

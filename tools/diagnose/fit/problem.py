@@ -65,7 +65,7 @@ class Fitted:
     pulled: Array  # (t, q + p) products of what is allowed with `own`
     gradient: Array  # (q + p,) of `nats`, what is allowed fitted to each
     curvature: Array  # (q + p, q + p) likewise
-    held: Bools  # (q + p,) stands at its bound and wants out
+    held: Bools  # (q + p,) is at an active bound
     converged: bool = False
 
     @property
@@ -166,9 +166,9 @@ class Problem:
         other.__dict__.pop("root", None)
         return other
 
-    def ground(self, effects: Sequence[Maker], free: Sequence[Free]) -> Ground:
+    def ground(self, effects: Sequence[Maker], free: Sequence[Free]) -> EffectsObjective:
         """What is descended for a set of effects."""
-        return Ground(self, tuple(effects), tuple(free))
+        return EffectsObjective(self, tuple(effects), tuple(free))
 
     def descend(
         self,
@@ -180,7 +180,7 @@ class Problem:
         near: Fitted | None = None,
     ) -> Fitted:
         """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,); the
-        strengths of the last effect may be less at the start (`Ground.begun`). rounds: of
+        strengths of the last effect may be less at the start (`EffectsObjective.begun`). rounds: of
         linearisation at most; 0: it stands where it is put. near: a fit whose derivatives by the
         constants do for a beginning.
         """
@@ -217,8 +217,8 @@ class Tried:
     objective: float
 
 
-class Ground:
-    """What is descended for one set of effects: see descent.Ground.
+class EffectsObjective:
+    """What is descended for one set of effects: see descent.Objective.
 
     penalty: (q + p + t,) square root of the prior precision.
     """
@@ -234,12 +234,12 @@ class Ground:
 
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
-        self.bounds = descent.Bounds(low, high)
+        self.bounds = descent.CoordinateBounds(low, high)
         shapes = [f.parameter.role != "strength" for f in free]
         self.curved = np.array([False] * self._count + shapes)
 
     def tried(self, centre: Array) -> tuple[Tried, float]:
-        """See descent.Ground; constants, then effect parameters (n,)."""
+        """See descent.Objective; constants, then effect parameters (n,)."""
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():

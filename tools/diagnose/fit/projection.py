@@ -26,7 +26,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class WhitenedBlock:
     """Whitened columns (n, m) on consecutive values `rows`, of which there are many: seven digits
     are enough for what is searched.
     """
@@ -113,7 +113,7 @@ class Projection:
             columns.T @ self.residual[rows] - inside.T @ self._pulled,
         )
 
-    def project_block(self, block: Block) -> tuple[Array, Array, Array]:
+    def project_block(self, block: WhitenedBlock) -> tuple[Array, Array, Array]:
         """Of a block of columns taken one by one: squares (m,), coordinates in the model's
         directions (q, m), b (m,).
         """

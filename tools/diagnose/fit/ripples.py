@@ -6,13 +6,13 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.signatures import highest_order
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def restored(rig: Rig, channel: str) -> list[Line]:
+def restored(rig: Rig, channel: str) -> list[SpectralLine]:
     """Lines of a channel that stand on the grid as they are at its times."""
     lines = [line for name in rig.recorded(channel) for line in rig.lines.of(name)]
     return [line for line in lines if line.axis == "angle" and not line.harmonic]
@@ -49,6 +49,6 @@ def orders_shown(stack: Stack, lowest: float) -> Array:
     return np.unique(np.concatenate((whole, more)))
 
 
-def _too_fast(rig: Rig, line: Line) -> bool:
+def _too_fast(rig: Rig, line: SpectralLine) -> bool:
     rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
     return line.frequency[1] > TUNING.fit.order_nyquist * rate

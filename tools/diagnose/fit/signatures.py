@@ -169,7 +169,7 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
 
 
 def resolved_order(rig: Rig) -> float:
-    """Ripples a turn by which two ripples must differ for the longest run to tell them apart."""
+    """Ripples a turn by which two ripples must differ for the longest run to distinguish them."""
     turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
     return 1.0 / max(turned, SLIGHT)
 

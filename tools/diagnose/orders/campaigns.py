@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.tools.diagnose.orders.lines import Line, find_lines, size_in
+from gritd.tools.diagnose.orders.lines import SpectralLine, find_lines, size_in
 from gritd.tools.diagnose.orders.stretches import Samples
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -21,31 +21,31 @@ class Lines:
     configured: the ripples a turn of what the configuration has already.
     """
 
-    new: tuple[Line, ...] = ()
-    reference: tuple[Line, ...] = ()
+    new: tuple[SpectralLine, ...] = ()
+    reference: tuple[SpectralLine, ...] = ()
     aligned: float = 0.0
     configured: tuple[float, ...] = ()
 
     @property
-    def every(self) -> tuple[Line, ...]:
+    def every(self) -> tuple[SpectralLine, ...]:
         """Of both campaigns."""
         return (*self.new, *self.reference)
 
     def renamed(self, name: str, channel: str, scale: float) -> Lines:
         """With the lines of one channel as those of another, in whose unit it is `scale`."""
 
-        def told(lines: Sequence[Line]) -> tuple[Line, ...]:
+        def told(lines: Sequence[SpectralLine]) -> tuple[SpectralLine, ...]:
             return tuple(x.scaled(channel, scale) if x.channel == name else x for x in lines)
 
         return replace(self, new=told(self.new), reference=told(self.reference))
 
-    def of(self, channel: str) -> list[Line]:
+    def of(self, channel: str) -> list[SpectralLine]:
         """All lines of a channel, those of both campaigns once."""
         own = [line for line in self.new if line.channel == channel]
         more = [line for line in self.reference if line.channel == channel]
         return own + [line for line in more if not any(same(line, other) for other in own)]
 
-    def fresh(self, axis: str = "angle") -> list[Line]:
+    def fresh(self, axis: str = "angle") -> list[SpectralLine]:
         """Lines of the new campaign that are no harmonics, that the configuration does not have,
         and that the reference does not have at half their size at least.
         """
@@ -53,17 +53,17 @@ class Lines:
         own = (line for line in own if not self._configured(line))
         return [x for x in own if self.before(x) <= TUNING.orders.known * x.size]
 
-    def _configured(self, line: Line) -> bool:
+    def _configured(self, line: SpectralLine) -> bool:
         near = TUNING.orders.same * line.cell
         return line.axis == "angle" and any(abs(line.at - n) < near for n in self.configured)
 
-    def before(self, line: Line) -> float:
+    def before(self, line: SpectralLine) -> float:
         """Size of a line in the reference. One of few turns may stand there without being found
         among all that are tried.
         """
         return max((x.size for x in self.reference if same(line, x)), default=line.before)
 
-    def shared(self, line: Line) -> bool:
+    def shared(self, line: SpectralLine) -> bool:
         """Whether the reference has a line too: found there, or held at half its size."""
         found = any(same(line, other) for other in self.reference)
         return found or line.before > TUNING.orders.known * line.size
@@ -72,7 +72,7 @@ class Lines:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported
         first; those far behind it are left out.
         """
-        standing: list[Line] = []
+        standing: list[SpectralLine] = []
         inside = (line for line in self.fresh() if low <= line.at <= high)
         for line in sorted(inside, key=lambda x: (-x.support, x.sigma)):
             least = standing[0].support - TUNING.orders.behind if standing else -np.inf
@@ -93,12 +93,12 @@ def lines_of(new: Runs, reference: Runs = ()) -> Lines:
     return Lines(of_both, find_lines(reference))
 
 
-def same(one: Line, other: Line) -> bool:
+def same(one: SpectralLine, other: SpectralLine) -> bool:
     """Whether two lines of a channel are one, in two campaigns."""
     return one.channel == other.channel and one.axis == other.axis and _near(one, other)
 
 
-def _near(one: Line, other: Line) -> bool:
+def _near(one: SpectralLine, other: SpectralLine) -> bool:
     apart = TUNING.orders.same * max(one.cell, other.cell)
     doubt = TUNING.orders.apart_sigma * float(np.hypot(one.sigma, other.sigma))
     return abs(one.at - other.at) < max(apart, doubt)

@@ -10,7 +10,7 @@ and the lags of all events are what a latency τ and a length of travel λ make 
     dᵢ = τ + λ/vᵢ,   v = ½ (r|ω| + |ẋ|).
 
 A sensor that is late is so by the same time at every speed. Soil that is late is so by the same
-length. At one speed alone the two cannot be told apart, and both have a large σ.
+length. At one speed alone the two cannot be distinguished, and both have a large σ.
 Source: matching by cross-correlation, Knapp and Carter (1976), IEEE Trans. ASSP 24, 320-327.
 """
 

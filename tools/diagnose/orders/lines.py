@@ -24,7 +24,7 @@ AXES = ("angle", "time")
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A line of one channel.
 
     axis:       "angle": `at` ripples a turn of the wheel; "time": `at` in Hz.
@@ -52,7 +52,7 @@ class Line:
     harmonic: float = 0.0
     before: float = 0.0
 
-    def scaled(self, channel: str, scale: float) -> Line:
+    def scaled(self, channel: str, scale: float) -> SpectralLine:
         """As a line of another channel."""
         amplitudes = tuple(a and a.scaled(scale) for a in self.amplitudes)
         before = abs(scale) * self.before
@@ -70,7 +70,7 @@ class Line:
         return float(np.sqrt(np.mean(np.square(known)) / len(known))) if known else np.nan
 
 
-def size_in(runs: Sequence[Mapping[str, Samples]], line: Line) -> float:
+def size_in(runs: Sequence[Mapping[str, Samples]], line: SpectralLine) -> float:
     """Size of a line in other runs, found there or not, in the channel's unit; 0 where they hold
     too little of it to tell.
     """
@@ -197,8 +197,8 @@ class _Channel:
         return tuple(_together(each) for each in of_runs)
 
     def take(self, axis: str, at: float) -> None:
-        """Leave a line out. Those taken before it are told anew beside it, each in turn: Li and
-        Stoica (1996), IEEE Trans. Signal Process. 44, 281-295.
+        """Leave a line out. Those taken before it are estimated anew beside it, each in turn: Li
+        and Stoica (1996), IEEE Trans. Signal Process. 44, 281-295.
         """
         self._waves[axis, at] = [np.zeros(part.samples.values.size) for part in self.parts]
         for _ in range(TUNING.orders.sweeps if len(self._waves) > 1 else 1):
@@ -253,13 +253,13 @@ def _together(parts: Sequence[Amplitude]) -> Amplitude | None:
     return Amplitude(scale * parts[0].cos, scale * parts[0].sin, sigma)
 
 
-def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
+def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...]:
     """Lines of all channels of these runs, by channel, the loudest first."""
     names = list(dict.fromkeys(name for run in runs for name in run))
     channels = [_Channel(name, parts) for name in names if (parts := list(_parts(runs, name)))]
     tried = sum(places.count for c in channels for places in c.places.values())
 
-    lines: list[Line] = []
+    lines: list[SpectralLine] = []
     for _ in range(TUNING.orders.most_lines):
         best = _likeliest(channels, tried)
         if best is None or best[0] + np.log(tried) > np.log(TUNING.orders.level):
@@ -276,7 +276,7 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
     return tuple(_with_harmonics(lines, channels))
 
 
-def _overtones(channel: _Channel, line: Line, runs: int) -> Iterator[Line]:
+def _overtones(channel: _Channel, line: SpectralLine, runs: int) -> Iterator[SpectralLine]:
     """Harmonics of a line, which few places need be tried for."""
     times = range(2, TUNING.orders.harmonics + 1)
     for at in (k * line.at for k in times):
@@ -286,7 +286,7 @@ def _overtones(channel: _Channel, line: Line, runs: int) -> Iterator[Line]:
             yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
 
 
-def _rest(line: Line, louder: Sequence[Line]) -> bool:
+def _rest(line: SpectralLine, louder: Sequence[SpectralLine]) -> bool:
     """Whether it is what is left about a louder line, whose size changes within a stretch."""
     return any(
         (other.channel, other.axis) == (line.channel, line.axis)
@@ -322,13 +322,15 @@ def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channe
     return min(strongest, key=lambda each: each[0] - prefer[each[2]])
 
 
-def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, runs: int) -> Line:
+def _taken(
+    channel: _Channel, axis: str, at: float, p: float, support: float, runs: int
+) -> SpectralLine:
     """The line, which the channel loses. The noise about it is what is left."""
     before = list(channel.parts)
     channel.take(axis, at)
     amplitudes = channel.amplitudes(before, axis, at, runs)
 
-    return Line(
+    return SpectralLine(
         channel.name,
         axis,
         at,
@@ -341,8 +343,10 @@ def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, ru
     )
 
 
-def _with_harmonics(lines: Sequence[Line], channels: Sequence[_Channel]) -> Iterator[Line]:
-    """The lines by channel, the loudest first, each told whether it is a harmonic."""
+def _with_harmonics(
+    lines: Sequence[SpectralLine], channels: Sequence[_Channel]
+) -> Iterator[SpectralLine]:
+    """The lines by channel, the loudest first, each marked whether it is a harmonic."""
     for channel in channels:
         own = sorted((x for x in lines if x.channel == channel.name), key=lambda x: -x.size)
         for number, line in enumerate(own):
@@ -350,7 +354,7 @@ def _with_harmonics(lines: Sequence[Line], channels: Sequence[_Channel]) -> Iter
             yield replace(line, harmonic=_base(line, louder))
 
 
-def _base(line: Line, louder: Sequence[Line]) -> float:
+def _base(line: SpectralLine, louder: Sequence[SpectralLine]) -> float:
     for other in louder:
         times = round(line.at / other.at)
         if (

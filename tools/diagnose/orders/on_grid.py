@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.stretches import (
     TURN,
+    GridMotion,
     Ints,
-    Motion,
     Series,
     steady_samples,
     stretches,
@@ -28,7 +28,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 def on_grid(
-    lines: Sequence[Line], motion: Motion, angle: Series, read: Series, middle: Array
+    lines: Sequence[SpectralLine], motion: GridMotion, angle: Series, read: Series, middle: Array
 ) -> tuple[Series, Array]:
     """Readings of a channel less its lines, and what of them belongs to the grid (g,).
 
@@ -52,13 +52,15 @@ def on_grid(
     return (time, left), restored
 
 
-def beyond(line: Line, grid: Array) -> bool:
+def beyond(line: SpectralLine, grid: Array) -> bool:
     """Whether a line is faster than a grid of these times (g,) [s] holds."""
     rate = 1.0 / float(np.median(np.diff(grid)))
     return line.frequency[1] > TUNING.fit.order_nyquist * rate
 
 
-def _weights(line: Line, motion: Motion, angle: Series, read: Series, count: int) -> Array:
+def _weights(
+    line: SpectralLine, motion: GridMotion, angle: Series, read: Series, count: int
+) -> Array:
     """Cosine and sine (m, 2) of a line in each stretch; that of the run where a stretch holds too
     few cycles.
     """
@@ -78,7 +80,7 @@ def _weights(line: Line, motion: Motion, angle: Series, read: Series, count: int
     return weights
 
 
-def _nearest(time: Array, begins: Array, ends: Array, motion: Motion) -> Ints:
+def _nearest(time: Array, begins: Array, ends: Array, motion: GridMotion) -> Ints:
     """The stretch (n,) whose ripple a time (n,) [s] has, −1 where the wheel does not drive."""
     between = 0.5 * (ends[:-1] + begins[1:])
     number = np.searchsorted(between, time)
@@ -89,7 +91,7 @@ def _nearest(time: Array, begins: Array, ends: Array, motion: Motion) -> Ints:
     return np.where(driving, number, -1).astype(np.int64)
 
 
-def _wave(line: Line, angle: Series, time: Array, stretch: Ints, weights: Array) -> Array:
+def _wave(line: SpectralLine, angle: Series, time: Array, stretch: Ints, weights: Array) -> Array:
     """(n,) at times (n,) [s], 0 where the wheel does not drive."""
     place = np.interp(time, *angle) / TURN if line.axis == "angle" else time
     waves = np.sum(pair(place, line.at) * weights[np.maximum(stretch, 0)], axis=1)

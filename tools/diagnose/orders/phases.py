@@ -11,13 +11,13 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.stretches import TURN
 from gritd.tools.diagnose.orders.wave import Amplitude
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def guide(lines: Lines) -> Line | None:
+def guide(lines: Lines) -> SpectralLine | None:
     """The ripple by which the runs of the new campaign are aligned; None where they are already, or
     where one speed alone cannot tell it from a vibration.
     """
@@ -29,17 +29,17 @@ def guide(lines: Lines) -> Line | None:
     return best if max(apart, default=0.0) > TUNING.orders.out_of_step else None
 
 
-def shifts(line: Line) -> Array:
+def shifts(line: SpectralLine) -> Array:
     """To be added to the wheel's angle of each run (r,) [rad]; 0 where the run does not tell."""
     return np.array(_turns(line)) / line.at
 
 
-def _at_speeds(line: Line) -> bool:
+def _at_speeds(line: SpectralLine) -> bool:
     low, high = line.frequency
     return high > TUNING.orders.two_speeds * low
 
 
-def _turns(line: Line) -> list[float]:
+def _turns(line: SpectralLine) -> list[float]:
     """By what the ripple of each run is behind that of the surest one [rad of the ripple]."""
     surest = max((a for a in line.amplitudes if a is not None), key=lambda a: a.size / a.sigma)
     return [

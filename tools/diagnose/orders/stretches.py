@@ -93,7 +93,7 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class GridMotion:
     """How a run was driven, on any grid of times; arrays (n,), NaN where nothing is known."""
 
     time: Array  # [s]
@@ -103,7 +103,7 @@ class Motion:
 
 
 def steady_samples(
-    motion: Motion, angle: Series, channels: Mapping[str, Series], most: int | None = None
+    motion: GridMotion, angle: Series, channels: Mapping[str, Series], most: int | None = None
 ) -> dict[str, Samples]:
     """What each channel read in the steady stretches of a run.
 
@@ -125,7 +125,7 @@ def steady_samples(
     return out
 
 
-def stretches(motion: Motion) -> tuple[Array, Array]:
+def stretches(motion: GridMotion) -> tuple[Array, Array]:
     """Beginnings and ends (m,) [s] of the stretches at steady speeds."""
     steady = _steady(motion)
     edges = np.diff(np.concatenate(([0], steady.astype(int), [0])))
@@ -137,7 +137,7 @@ def stretches(motion: Motion) -> tuple[Array, Array]:
     return begins[long], ends[long]
 
 
-def _steady(motion: Motion) -> NDArray[np.bool_]:
+def _steady(motion: GridMotion) -> NDArray[np.bool_]:
     """(n,) the wheel drives one way, settled, and neither a speed nor the load changes."""
     speed, step = motion.wheel_speed, float(np.median(np.diff(motion.time)))
     known = np.isfinite(speed) & np.isfinite(motion.carriage_speed)

@@ -27,7 +27,7 @@ def wheel_constants(
     weights_stated: bool,
     had: Sequence[ConfiguredEffect],
 ) -> tuple[Constant, ...]:
-    """Soil, calibration of every channel, weights, configured effects, and those had anyway.
+    """Soil, calibration of every channel, weights, configured effects, and baseline effects.
 
     weights_stated: whether all runs state their weights; else the load cell tells them.
     """

@@ -33,7 +33,7 @@ from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
 from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.constants import of_channel
-from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run
+from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, GridRun, Held
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.rig.stack import Stack
@@ -200,7 +200,7 @@ class DriveRig:
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:
         """None: the menu of experiments is a wheel's. Constants u (q,) in prior σ."""
 
-    def _run(self, motion: DriveMotion, name: str) -> Run:
+    def _run(self, motion: DriveMotion, name: str) -> GridRun:
         velocity, torque, angle = (
             motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
         )
@@ -218,7 +218,7 @@ class DriveRig:
             "direction": np.tanh(velocity / still),
             "constant": np.ones(velocity.size),
         }
-        return Run(
+        return GridRun(
             name,
             motion.time[motion.kept],
             {"torque": torque},

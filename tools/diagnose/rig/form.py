@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.model.discrepancy import Usual, conditions_of, weight_of
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import FormSource, Run
+from gritd.tools.diagnose.rig.interface import FormSource, GridRun
 from gritd.tools.diagnose.tuning import TUNING
 
 SOURCES = (  # name, channels that share one discrepancy, whether it turns with the direction
@@ -19,7 +19,7 @@ SOURCES = (  # name, channels that share one discrepancy, whether it turns with 
 
 
 def wheel_forms(
-    runs: Sequence[Run],
+    runs: Sequence[GridRun],
     channels: Sequence[str],
     radius: float,
     driven: Sequence[Array] | None = None,
@@ -55,7 +55,7 @@ def _mean_square(parts: Sequence[Array]) -> float:
     return float(np.mean(values**2)) if values.size else 0.0
 
 
-def usual_of(runs: Sequence[Run]) -> Usual | None:
+def usual_of(runs: Sequence[GridRun]) -> Usual | None:
     """Geometric means of load and rim speed while the wheel drives; None where it never does."""
     load, speed = (np.concatenate([r.covariates[n] for r in runs]) for n in ("load", "speed"))
     driving = (speed > 0.0) & (load > 0.0)
@@ -68,7 +68,7 @@ def usual_of(runs: Sequence[Run]) -> Usual | None:
     )
 
 
-def _conditions(run: Run, usual: Usual, radius: float) -> Array:
+def _conditions(run: GridRun, usual: Usual, radius: float) -> Array:
     known = run.covariates
     travel = radius * known["rolled"]
     return conditions_of(
@@ -76,7 +76,7 @@ def _conditions(run: Run, usual: Usual, radius: float) -> Array:
     )
 
 
-def _weight(run: Run, usual: Usual, signed: bool) -> Array:
+def _weight(run: GridRun, usual: Usual, signed: bool) -> Array:
     """How large δ is at each value (n,): in proportion to the load, 0 where no soil is touched."""
     known = run.covariates
     direction = np.where(known["direction"] < 0.0, -1.0, 1.0)

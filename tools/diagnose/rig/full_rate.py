@@ -16,10 +16,10 @@ from gritd.estimator.offline.windows import block_mean
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.on_grid import on_grid
 from gritd.tools.diagnose.orders.phases import guide, shifts
-from gritd.tools.diagnose.orders.stretches import Motion, Samples, Series, steady_samples
+from gritd.tools.diagnose.orders.stretches import GridMotion, Samples, Series, steady_samples
 from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.signals import Signals, series_of
 from gritd.tools.diagnose.tuning import TUNING
@@ -92,7 +92,7 @@ def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
     return replace(signals, analogue=analogue)
 
 
-def aligned(signals: Sequence[Signals], line: Line | None) -> list[Signals]:
+def aligned(signals: Sequence[Signals], line: SpectralLine | None) -> list[Signals]:
     """Runs of the new campaign with wheel angles that count from one angle, as a ripple tells."""
     if line is None:
         return list(signals)
@@ -102,9 +102,9 @@ def aligned(signals: Sequence[Signals], line: Line | None) -> list[Signals]:
     ]
 
 
-def _motion(signals: Signals) -> Motion:
+def _motion(signals: Signals) -> GridMotion:
     load = signals.analogue.get("load")
-    return Motion(signals.time, signals.wheel_speed, signals.carriage_rate, load)
+    return GridMotion(signals.time, signals.wheel_speed, signals.carriage_rate, load)
 
 
 def _since(signals: Signals, read: Series) -> Series:

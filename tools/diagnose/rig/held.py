@@ -15,7 +15,7 @@ from gritd.estimator.model.correction import Correction, weights_of
 from gritd.estimator.model.discrepancy import conditions_of, features_of
 from gritd.estimator.model.learnt import CHANNELS, LearntForm
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Run
+from gritd.tools.diagnose.rig.interface import GridRun
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -26,7 +26,7 @@ class HeldForm:
     def __init__(
         self,
         form: LearntForm,
-        runs: Sequence[Run],
+        runs: Sequence[GridRun],
         channels: Sequence[str],
         radius: float,
         lost: Collection[str] = (),
@@ -105,7 +105,7 @@ def _kind(channel: str) -> int | None:
     return CHANNELS.index(name) if name in CHANNELS else None
 
 
-def _told(run: Run, radius: float, correction: Correction) -> tuple[Array, Array]:
+def _told(run: GridRun, radius: float, correction: Correction) -> tuple[Array, Array]:
     """Conditions (n, d) and weights (n, 3) of a run."""
     known = run.covariates
     travel = radius * known["rolled"]

@@ -76,7 +76,7 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Run:
+class GridRun:
     """One run on the analysis grid; arrays (n,). `used` says which values of a channel the
     comparison counts; `idle` is 1 where a torque is the motor's alone that else is a loss, else 0.
     """
@@ -176,7 +176,7 @@ class Rig(Protocol):
     caveats: list[str]
 
     @property
-    def runs(self) -> Sequence[Run]: ...
+    def runs(self) -> Sequence[GridRun]: ...
 
     @property
     def channels(self) -> tuple[str, ...]: ...

@@ -13,7 +13,7 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.covariates import covariates
-from gritd.tools.diagnose.rig.interface import Bools, Run
+from gritd.tools.diagnose.rig.interface import Bools, GridRun
 from gritd.tools.diagnose.rig.recorded import measured_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import states, turned_back
@@ -32,7 +32,7 @@ def measured_run(
     sinkage: Array,
     idle: Bools | None,
     tabled: bool,
-) -> Run:
+) -> GridRun:
     """One run.
 
     sinkage: the predicted one (n,) [m], as a covariate.
@@ -62,7 +62,7 @@ def measured_run(
     alone = dict.fromkeys(channels, np.zeros(known.size))
     if idle is not None:
         alone["torque"] = idle.astype(float)
-    return Run(signals.name, np.asarray(motion.time), measured, used, along, alone)
+    return GridRun(signals.name, np.asarray(motion.time), measured, used, along, alone)
 
 
 def idle_values(
@@ -96,7 +96,7 @@ def sinkage_from_prior(
     ).sinkage
 
 
-def torque_is_held(runs: Sequence[Run]) -> bool:
+def torque_is_held(runs: Sequence[GridRun]) -> bool:
     """Whether a servo holds torque at rest: the current at rest differs from rest to rest, by more
     than its noise, so it tells nothing.
     """
@@ -118,7 +118,7 @@ def torque_is_held(runs: Sequence[Run]) -> bool:
     return float(np.ptp(means)) >= least
 
 
-def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:
+def without_torque_at_rest(runs: Sequence[GridRun]) -> list[GridRun]:
     """The runs, in which no torque counts while the wheel stands."""
     told = []
     for run in runs:
@@ -128,7 +128,7 @@ def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:
     return told
 
 
-def _resting(run: Run) -> Bools:
+def _resting(run: GridRun) -> Bools:
     """Values (n,) of the torque that count, at which the wheel stands."""
     resting: Bools = run.used["torque"] & (run.covariates["speed"] == 0.0)
     return resting

@@ -13,7 +13,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Run
+from gritd.tools.diagnose.rig.interface import GridRun
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -23,7 +23,7 @@ def height_of(settings: Settings) -> float:
 
 
 def reliefs_of(
-    runs: Sequence[Run], channels: Sequence[str], height: float
+    runs: Sequence[GridRun], channels: Sequence[str], height: float
 ) -> Iterator[list[Mapping[str, Array]]]:
     """Of each run and each wave of its surface, per run what every channel (n,) reads of it, one
     standard deviation, in the channels' units. height: standard deviation of the surface [m].

@@ -121,7 +121,7 @@ def felt(time: Array, load: Array) -> tuple[Array, Array]:
     sensor sits beside the wheel, so friction of the axis is in it.
 
     The error of a mean over m values is shared by about m values. As the error of one reading in
-    each of them it tells as much of what they have in common, and that is what is told.
+    each of them it tells as much of what they have in common, and that is what is reported.
     """
     noise, count = _noise(load), np.arange(_half(time) + 1)
     means = np.array([_moments(load, half).mean(axis=1) for half in range(count.size)])

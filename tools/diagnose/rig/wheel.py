@@ -26,7 +26,14 @@ from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_flo
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.full_rate import aligned
 from gritd.tools.diagnose.rig.held import HeldForm
-from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, FormSource, LawForm, Run
+from gritd.tools.diagnose.rig.interface import (
+    Bools,
+    Constant,
+    Foreseen,
+    FormSource,
+    GridRun,
+    LawForm,
+)
 from gritd.tools.diagnose.rig.load_error import load_errors_in
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
@@ -286,7 +293,7 @@ class WheelRig:
 
     # ---- what was recorded -----------------------------------------------------------------------
 
-    def _measured(self, signals: Sequence[Signals]) -> list[Run]:
+    def _measured(self, signals: Sequence[Signals]) -> list[GridRun]:
         prior = {constant.name: constant.value for constant in self.constants}
         soil = Soil(*(prior[name] for name in SOIL))
         idles: Sequence[Bools | None] = self._idle or [None for _ in signals]

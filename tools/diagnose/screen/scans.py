@@ -22,7 +22,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.fit.projection import Block, Projection
+from gritd.tools.diagnose.fit.projection import Projection, WhitenedBlock
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise import lines
@@ -45,7 +45,7 @@ class Family:
 
     shape: Shape
     at: Array
-    blocks: tuple[Block, ...]
+    blocks: tuple[WhitenedBlock, ...]
     near: Array | None = None
 
     @property
@@ -214,9 +214,9 @@ def _rows(own: Bools) -> slice:
     return slice(int(index[0]), int(index[-1]) + 1)
 
 
-def _block(noise: Noise, rows: slice, raw: Array) -> Block:
+def _block(noise: Noise, rows: slice, raw: Array) -> WhitenedBlock:
     white = np.asarray(noise.whitener[rows, rows] @ raw.reshape(len(raw), -1))
-    return Block(rows, white.astype(np.float32))
+    return WhitenedBlock(rows, white.astype(np.float32))
 
 
 # ---- those that stand out ----------------------------------------------------------------------

@@ -43,7 +43,7 @@ class Screening:
     """All that may be amiss beside the effects.
 
     base: exact in its form; forms: what the form of the model may be off by; functions: smooth
-    functions without a name; families: waves and steps without a name.
+    unexplained terms; families: unexplained waves and steps.
     """
 
     problem: Problem

@@ -4,7 +4,7 @@ simulated cases whose plants have other forms than the library's.
 The evidence of every explanation [nats] becomes a probability by one temperature, the odds of a
 listed effect, of one more effect and of what is in no list, and the share of cases in which all
 evidence misleads. A rig that has a reference is one that the equations do not quite follow, so what
-is new on it is told apart by less: it has a table of its own.
+is new on it is distinguished by less: it has a table of its own.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TABLE = Path(__file__).with_name("calibration.json")
 
 
 @dataclass(frozen=True)
-class Calibration:
+class OddsCalibration:
     """Log odds are against the discrepancy of form alone. candidates: listed effects, each of which
     has an equal share of the odds.
     """
@@ -32,7 +32,7 @@ class Calibration:
     temperature: float  # by which evidence is divided
     listed: float  # log odds of a listed effect against the discrepancy of form alone
     more: float  # log odds of one more effect
-    nameless: float  # log odds of functions without a name
+    nameless: float  # log odds of unexplained terms
     lapse: float  # share of cases in which the evidence misleads: no probability exceeds 1 less it
     candidates: int = 1
 
@@ -58,8 +58,8 @@ def table_of(referred: bool) -> str:
 
 
 @cache
-def learnt(candidates: int = 1, referred: bool = False) -> Calibration:
+def learnt(candidates: int = 1, referred: bool = False) -> OddsCalibration:
     """What calibration.json holds, for so many listed effects; referred: beside a reference."""
     table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))[table_of(referred)]
-    names = [n for n in Calibration.__dataclass_fields__ if n != "candidates"]
-    return Calibration(**{name: float(table[name]) for name in names}, candidates=candidates)
+    names = [n for n in OddsCalibration.__dataclass_fields__ if n != "candidates"]
+    return OddsCalibration(**{name: float(table[name]) for name in names}, candidates=candidates)

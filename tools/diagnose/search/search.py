@@ -25,7 +25,7 @@ from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.evidence import Pass, Weighed, pass_beside, varied_pass
 from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
-from gritd.tools.diagnose.search.calibration import Calibration, learnt
+from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
 from gritd.tools.diagnose.tuning import TUNING
 
 TURNING = "wheel_angle"  # what an effect that ripples goes with
@@ -33,7 +33,7 @@ FURTHER = {1: "second", 2: "third"}  # effect, beside so many
 
 
 @dataclass(frozen=True)
-class Search:
+class EffectSearch:
     """All models that were fitted, and the screen beside the bare model.
 
     models: the base model first, exact in its form; then the bare model, with the discrepancy of
@@ -61,7 +61,7 @@ class Search:
         return self.models[1]
 
     @property
-    def calibration(self) -> Calibration:
+    def calibration(self) -> OddsCalibration:
         """How far evidence is to be trusted here."""
         stack = self.problem.stack
         return learnt(len(stack.rig.effects), stack.referred)
@@ -89,7 +89,7 @@ class Search:
 
 def search_models(
     screening: Screening, step: Callable[[str], None] = lambda _: None, jobs: int = 1
-) -> Search:
+) -> EffectSearch:
     """Forward steps from the bare model if the screen alarms.
 
     jobs: processes that fit.
@@ -120,10 +120,10 @@ def search_models(
     return search
 
 
-def begin(screening: Screening, jobs: int = 1) -> Search:
+def begin(screening: Screening, jobs: int = 1) -> EffectSearch:
     """The base model, the bare one, and what stands out beside it."""
     bare = _bare(screening, screening.base)
-    return Search(screening, (screening.base, bare), screen(screening, bare, jobs))
+    return EffectSearch(screening, (screening.base, bare), screen(screening, bare, jobs))
 
 
 def _bare(screening: Screening, start: Model) -> Model:
@@ -133,7 +133,7 @@ def _bare(screening: Screening, start: Model) -> Model:
     return fit_model(screening.problem, screening.forms, (), (), begins, sizes, near=start.fitted)
 
 
-def _settled(search: Search) -> Search:
+def _settled(search: EffectSearch) -> EffectSearch:
     """With the bare model fitted again from where the best effect found its constants: no model may
     be worse than one that it holds.
     """
@@ -168,16 +168,16 @@ class Promise:
 
 
 def extended(
-    search: Search,
+    search: EffectSearch,
     starts: Sequence[Model],
     most: int,
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
-) -> Search:
+) -> EffectSearch:
     """With fits of some models and one more effect, the likeliest by linear algebra; no two of the
     same effects.
 
-    tell: is told how many of how many fits are done; of none before their number is known.
+    tell: is given how many of how many fits are done; of none before their number is known.
     """
     tell(0, 0)
     every = [p for model in starts for p in _promises(search, model, jobs)]
@@ -198,7 +198,7 @@ def extended(
     return replace(search, models=models, failed=(*search.failed, *failed))
 
 
-def _promises(search: Search, model: Model, jobs: int) -> list[Promise]:
+def _promises(search: EffectSearch, model: Model, jobs: int) -> list[Promise]:
     """Effects that gain enough beside a model: a share of the best, which a fit may turn round."""
     first = search.first.effects
     if model is search.bare:
@@ -220,7 +220,7 @@ def _promises(search: Search, model: Model, jobs: int) -> list[Promise]:
     ]
 
 
-def _starts(search: Search, model: Model, beside: Pass, name: str) -> tuple[Weighed, ...]:
+def _starts(search: EffectSearch, model: Model, beside: Pass, name: str) -> tuple[Weighed, ...]:
     """The likeliest shape of an effect; beside the bare model of one with edges along the bed also
     others, elsewhere.
     """
@@ -253,16 +253,16 @@ def counting(step: Callable[[str], None], what: str) -> Callable[[int, int], Non
     return lambda done, of: step(f"{what}, {done} of {of}" if of else what)
 
 
-def shared(search: Search) -> list[object]:
+def shared(search: EffectSearch) -> list[object]:
     """What fits of a search hold: its freedoms and its models."""
     allowed = (freedom for freedom, _ in search.problem.allowance.parts)
     return [*allowed, *search.screening.forms, *search.models]
 
 
-def _with_effect(search: Search, promise: Promise) -> Model:
+def _with_effect(search: EffectSearch, promise: Promise) -> Model:
     """The model with one more effect, the best of its starts. Where it ends well below the model
-    that it holds, it has lost its way: it is fitted again from there, with the effect's strengths
-    at nought.
+    that it holds, it is at a poor local optimum: it is fitted again from there, with the effect's
+    strengths at nought.
     """
     model, effect = promise.model, search.problem.stack.rig.effects[promise.effect]
     begins = [(one.start, one.sizes) for one in promise.starts]
@@ -276,7 +276,9 @@ def _with_effect(search: Search, promise: Promise) -> Model:
     return max(made, again, key=lambda m: m.evidence)
 
 
-def _fitted_with(search: Search, promise: Promise, start: Array, sizes: tuple[int, ...]) -> Model:
+def _fitted_with(
+    search: EffectSearch, promise: Promise, start: Array, sizes: tuple[int, ...]
+) -> Model:
     """start (p,) of the effect's parameters; sizes: of the forms."""
     fitted, screening = promise.model.fitted, search.screening
     effect = search.problem.stack.rig.effects[promise.effect]
@@ -306,7 +308,7 @@ def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
 # ---- one effect less ---------------------------------------------------------------------------
 
 
-def _retested(search: Search, best: Model, jobs: int) -> Search:
+def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
     """With the best model less each of its effects, fitted from where the best one stands: no
     effect may owe its place to a fit of the others that ended elsewhere.
     """
@@ -331,7 +333,7 @@ def _the_better(models: Sequence[Model]) -> Iterator[Model]:
     return chain(models[:2], best.values())
 
 
-def without(search: Search, model: Model, name: str) -> Model:
+def without(search: EffectSearch, model: Model, name: str) -> Model:
     """A model less one of its effects: of the search, or fitted for the question."""
     kept = tuple(n for n in model.names if n != name)
     if not kept:
@@ -340,7 +342,7 @@ def without(search: Search, model: Model, name: str) -> Model:
     return max(known, key=lambda m: m.evidence) if known else _less(search, model, name)
 
 
-def _less(search: Search, model: Model, name: str) -> Model:
+def _less(search: EffectSearch, model: Model, name: str) -> Model:
     """A model less one of its several effects, fitted from where it stands."""
     fitted, kept = model.fitted, tuple(n for n in model.names if n != name)
     types = tuple(e for e, n in zip(fitted.effects, model.names, strict=True) if n != name)

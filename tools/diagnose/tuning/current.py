@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gritd.tools.diagnose.tuning.explain import Explain
-from gritd.tools.diagnose.tuning.fit import Fit
-from gritd.tools.diagnose.tuning.noise import Noise
+from gritd.tools.diagnose.tuning.fit import FitTuning
+from gritd.tools.diagnose.tuning.noise import NoiseTuning
 from gritd.tools.diagnose.tuning.orders import Orders
-from gritd.tools.diagnose.tuning.rig import Rig
-from gritd.tools.diagnose.tuning.screen import Screen
-from gritd.tools.diagnose.tuning.search import Search
+from gritd.tools.diagnose.tuning.rig import RigTuning
+from gritd.tools.diagnose.tuning.screen import ScreenTuning
+from gritd.tools.diagnose.tuning.search import SearchTuning
 from gritd.tools.diagnose.tuning.verdict import Verdict
 
 
@@ -22,11 +22,11 @@ class Tuning:
     """The numbers of every room. Only `replaced` puts another room's numbers in."""
 
     orders: Orders = field(default_factory=Orders)
-    rig: Rig = field(default_factory=Rig)
-    noise: Noise = field(default_factory=Noise)
-    fit: Fit = field(default_factory=Fit)
-    screen: Screen = field(default_factory=Screen)
-    search: Search = field(default_factory=Search)
+    rig: RigTuning = field(default_factory=RigTuning)
+    noise: NoiseTuning = field(default_factory=NoiseTuning)
+    fit: FitTuning = field(default_factory=FitTuning)
+    screen: ScreenTuning = field(default_factory=ScreenTuning)
+    search: SearchTuning = field(default_factory=SearchTuning)
     verdict: Verdict = field(default_factory=Verdict)
     explain: Explain = field(default_factory=Explain)
 

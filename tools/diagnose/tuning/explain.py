@@ -11,7 +11,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Explain:
-    """What of a diagnosis is told."""
+    """What of a diagnosis is reported."""
 
     # --- changes.py ---
     change_places: int = tuned(32, "places", "tried along a covariate", "run time")
@@ -47,14 +47,16 @@ class Explain:
         "the stated noise of a reading: a grid value is a mean of readings",
         "judgement",
     )
-    doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is told")
-    strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is told")
+    doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is reported")
+    strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is reported")
 
     # --- summary.py ---
     held_out_worse: float = tuned(
         0.1, "share", "by which the held-out error of a channel grows: an explanation in part"
     )
-    bent_far: float = tuned(0.3, "share", "by which our form is off: more is told as resembling")
+    bent_far: float = tuned(
+        0.3, "share", "by which our form is off: more is reported as resembling"
+    )
 
     # --- experiment.py ---
     instrument: float = tuned(
@@ -65,8 +67,8 @@ class Explain:
     )
     foreseen_together: int = tuned(10, "values", "that count as one: neighbours share their noise")
     gain_enough: float = tuned(10.0, "nats", "decide")
-    rivals: int = tuned(4, "explanations", "that an experiment is to tell apart", "run time")
-    gain_worth: float = tuned(1.0, "nats", "from which on two are said to be told apart")
+    rivals: int = tuned(4, "explanations", "that an experiment is to distinguish", "run time")
+    gain_worth: float = tuned(1.0, "nats", "from which on two are called distinguished")
     foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
 
     # --- explanation.py ---
@@ -112,7 +114,7 @@ class Explain:
     remainder_share: float = tuned(
         0.2, "share", "of a remainder's squares that a covariate must take to be named"
     )
-    remainder_parts: int = tuned(3, "parts", "of a covariate's range that are told apart")
+    remainder_parts: int = tuned(3, "parts", "of a covariate's range that are distinguished")
     remainder_values: int = tuned(10, "values", "needed")
     remainder_noise: float = tuned(0.5, "σ", "of the noise: a smaller remainder is within it")
 
@@ -121,18 +123,18 @@ class Explain:
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
 
     # --- ripples.py ---
-    one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that are told as one")
+    one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that count as one")
 
     # --- wording.py ---
     reads_nothing: float = tuned(1e-3, "-", "of the largest of several values: less reads 0")
-    more_digits: int = tuned(3, "digits", "at most, that tell values apart")
+    more_digits: int = tuned(3, "digits", "at most, that distinguish values")
     long_place: float = tuned(10.0, "m or s", "from which on a place has a digit more")
     equal_places: int = tuned(12, "decimals", "to which two contrasts are equal", "rounding")
     low_end: Range = tuned((0.0, 0.15), "choice", "quantiles between which a mean is taken")
     middle: Range = tuned((0.4, 0.6), "choice", "quantiles between which a mean is taken")
     high_end: Range = tuned((0.85, 1.0), "choice", "quantiles between which a mean is taken")
     middle_stands_out: float = tuned(
-        0.25, "-", "of the difference between the ends: a middle that far outside is told"
+        0.25, "-", "of the difference between the ends: a middle that far outside is reported"
     )
     means_alike: float = tuned(0.15, "-", "of a mean: two that are closer are called the same")
     runs_named: int = tuned(6, "runs", "that are all named; of more only the farthest off")

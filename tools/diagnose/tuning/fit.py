@@ -16,7 +16,7 @@ DAMPED = "damping of a mean over an interval"
 
 
 @dataclass(frozen=True)
-class Fit:
+class FitTuning:
     """How a model is fitted to the recordings, and how far it may be off."""
 
     # --- base.py ---
@@ -95,7 +95,7 @@ class Fit:
     form_apart: int = tuned(
         2,
         "sizes",
-        "by which the discrepancies of two channels may differ where the soil is told: ten times",
+        "by which the discrepancies of two channels may differ where the soil is known: ten times",
         PUBLISHED,
     )
     form_turn: float = tuned(
@@ -174,7 +174,7 @@ class Fit:
     # --- signatures.py ---
     highest_order: float = tuned(200.0, "1/turn", "ripples")
     order_nyquist: float = tuned(0.45, "-", "of the grid's rate: faster ripples are damped", DAMPED)
-    least_turns: float = tuned(1.5, "ripples", "a run must hold to be told from a trend")
+    least_turns: float = tuned(1.5, "ripples", "a run must hold to be distinguished from a trend")
     strongest_orders: int = tuned(3, "orders", "of a channel that do not count as its noise")
     most_orders: int = tuned(120, "orders", "tried at most", "run time")
     lowest_ripple: float = tuned(3.0, "1/turn", "lower is no ripple of the noise")

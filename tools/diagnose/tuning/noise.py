@@ -13,7 +13,7 @@ DAMPED = "damping of a mean over an interval"
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseTuning:
     """What counts as noise in the recordings."""
 
     # --- colour.py ---
@@ -70,7 +70,7 @@ class Noise:
 
     # --- lines.py ---
     stretch: float = tuned(40.0, "s", "for which a wave keeps its phase at least")
-    cycles: float = tuned(2.0, "cycles", "in a stretch, to be told from a trend")
+    cycles: float = tuned(2.0, "cycles", "in a stretch, to be distinguished from a trend")
     line_density: float = tuned(
         2.0, "-", "frequencies tried in each that the longest stretch resolves"
     )

@@ -47,7 +47,7 @@ class Orders:
     rest: float = tuned(0.03, "-", "of a louder line near by: what is left about it")
     rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
-    sweeps: int = tuned(3, "times", "all lines of a channel are told anew beside another")
+    sweeps: int = tuned(3, "times", "all lines of a channel are estimated anew beside another")
     refinements: int = tuned(4, "times", "a line's place is looked for more finely")
     refined_places: int = tuned(9, "places", "of each such look")
     prefer_angle: float = tuned(
@@ -68,12 +68,12 @@ class Orders:
     sure_phase: float = tuned(6.0, "σ", "of a ripple in a run, whose phase then is known")
 
     # --- latency.py ---
-    lag_rate: float = tuned(50.0, "Hz", "grid on which lags are told", "run time")
+    lag_rate: float = tuned(50.0, "Hz", "grid on which lags are estimated", "run time")
     lag_longest: float = tuned(900.0, "s", "of a run that is looked at", "run time, memory")
     event_reach: float = tuned(0.8, "s", "before and after a change")
     event_change: float = tuned(0.06, "1/s", "of a channel's size: a change")
     usual_size: float = tuned(0.9, "quantile", "of a channel's values: its size")
-    event_smooth: float = tuned(0.2, "s", "over which the rate of a change is told")
+    event_smooth: float = tuned(0.2, "s", "over which the rate of a change is estimated")
     event_values: int = tuned(30, "values", "of an event at least")
     farthest_lag: float = tuned(0.6, "s", "of an event: a later channel follows something else")
     lag_rounds: int = tuned(6, "rounds", "of fit and shift in turn")
@@ -84,7 +84,7 @@ class Orders:
     event_colour: float = tuned(
         8.0, "-", "values that are wrong together: what a model misses about a change is slow"
     )
-    least_events: int = tuned(6, "events", "of a channel, or nothing is told")
+    least_events: int = tuned(6, "events", "of a channel, or nothing is reported")
     usual_length: float = tuned(0.05, "m", "of travel over which a contact follows: prior σ")
     lag_doubt: float = tuned(0.015, "s", "that a model of starts and stops is off by", "a balance")
-    lag_sure: float = tuned(4.0, "σ", "from which a latency is told")
+    lag_sure: float = tuned(4.0, "σ", "from which a latency is reported")

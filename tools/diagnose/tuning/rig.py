@@ -27,7 +27,7 @@ LEVELS: Mapping[str, Levels] = {  # factors on the middle speed, slips, factors 
 
 
 @dataclass(frozen=True)
-class Rig:
+class RigTuning:
     """How recordings become comparable values, and what is known of constants beforehand."""
 
     # --- adapter.py ---

@@ -8,7 +8,7 @@ from gritd.tools.diagnose.tuning.field import tuned
 
 
 @dataclass(frozen=True)
-class Screen:
+class ScreenTuning:
     """When evidence is an alarm, and what is searched for."""
 
     # --- screening.py ---

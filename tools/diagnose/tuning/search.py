@@ -8,7 +8,7 @@ from gritd.tools.diagnose.tuning.field import tuned
 
 
 @dataclass(frozen=True)
-class Search:
+class SearchTuning:
     """How far the search for effects goes."""
 
     effects_first: int = tuned(7, "effects", "fitted beside the base model", "run time")

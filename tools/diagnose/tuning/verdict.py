@@ -33,7 +33,7 @@ class Verdict:
         2.0, "odds", "of explanations of as many effects, below which the simplest comes first"
     )
     resembles: float = tuned(
-        0.5, "probability", "of an explanation whose names are not accepted, to be told of"
+        0.5, "probability", "of an explanation whose names are not accepted, to be reported"
     )
 
     # --- resemblance.py, of each of `fit.bending_sizes` ---
@@ -58,7 +58,7 @@ class Verdict:
         "of the form error of an effect that something resembles",
         COUNTED,
     )
-    alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be told apart")
+    alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be distinguished")
     rivals: int = tuned(
         3, "models", "of a size, beside which what has no name is fitted", "run time"
     )

@@ -1,9 +1,9 @@
 """From fitted models to a verdict, probabilities and groups.
 
-Every explanation has an evidence: the discrepancy of form alone, listed effects with it, functions
-without a name instead of effects or beside them. `calibration.py` makes probabilities of these, and
-`resemblance.py` says how far an effect of each is to be trusted. An effect has the weight of all
-explanations that hold it, as far as it is trusted in them; `unlisted` has the rest.
+Every explanation has an evidence: the discrepancy of form alone, listed effects with it,
+unexplained terms instead of effects or beside them. `calibration.py` makes probabilities of these,
+and `resemblance.py` says how far an effect of each is to be trusted. An effect has the weight of
+all explanations that hold it, as far as it is trusted in them; `unlisted` has the rest.
 """
 
 from __future__ import annotations
@@ -20,19 +20,21 @@ from gritd.tools.diagnose.fit.evidence import log_bayes_expected
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
-from gritd.tools.diagnose.search.calibration import Calibration
-from gritd.tools.diagnose.search.search import Search, counting, shared, without
+from gritd.tools.diagnose.search.calibration import OddsCalibration
+from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
-from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, Weighed
+from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 from gritd.tools.diagnose.verdict.resemblance import trusted
 
 
-def decide(search: Search, jobs: int = 1, step: Callable[[str], None] = lambda _: None) -> Decision:
+def decide(
+    search: EffectSearch, jobs: int = 1, step: Callable[[str], None] = lambda _: None
+) -> Decision:
     """The verdict on a search.
 
-    jobs: processes that fit; step: is told what begins.
+    jobs: processes that fit; step: is given what begins.
     """
     screen = search.first
     if not screen.alarmed:
@@ -51,12 +53,12 @@ def decide(search: Search, jobs: int = 1, step: Callable[[str], None] = lambda _
 
 
 def _beside(
-    search: Search,
+    search: EffectSearch,
     models: Sequence[Model],
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
 ) -> dict[Model, Nameless | None]:
-    """What has no name beside each of some models. tell: is told how many of how many are done."""
+    """What has no name beside each of some models. tell: is given how many of how many are done."""
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
@@ -66,32 +68,34 @@ def _beside(
     return dict(zip(models, made, strict=True))
 
 
-def _rivals(search: Search, best: Model) -> list[Model]:
+def _rivals(search: EffectSearch, best: Model) -> list[Model]:
     """The likeliest models of as many effects as the best one, and of fewer."""
     sizes = range(1, len(best.names) + 1)
     rivals = [m for size in sizes for m in search.sized(size)[: TUNING.verdict.rivals]]
     return [m for m in rivals if m is not best]
 
 
-def weigh(search: Search, beside: Mapping[Model, Nameless | None]) -> list[Weighed]:
+def weigh(
+    search: EffectSearch, beside: Mapping[Model, Nameless | None]
+) -> list[WeighedExplanation]:
     """All explanations with their evidence [nats above the bare model].
 
-    beside: functions without a name beside some of the models, the bare one among these.
+    beside: unexplained terms beside some of the models, the bare one among these.
     """
-    every = [Weighed(m, m.names, 0, search.gain(m)) for m in search.models[1:]]
+    every = [WeighedExplanation(m, m.names, 0, search.gain(m)) for m in search.models[1:]]
     for model, nameless in beside.items():
         if nameless is not None:
             gain = search.gain(model) + nameless.gain
             count = len(nameless.functions)
-            every.append(Weighed(nameless.model, model.names, count, gain))
+            every.append(WeighedExplanation(nameless.model, model.names, count, gain))
     return every
 
 
 def judged(
-    search: Search,
-    weighed: Sequence[Weighed],
+    search: EffectSearch,
+    weighed: Sequence[WeighedExplanation],
     beside: Mapping[Model, Nameless | None],
-    calibration: Calibration,
+    calibration: OddsCalibration,
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
     to be there than to be resembled, and likelier than that nothing of the list is there.
@@ -129,7 +133,9 @@ def judged(
     )
 
 
-def trusting(search: Search, weighed: Sequence[Weighed], by: Calibration) -> list[Weighed]:
+def trusting(
+    search: EffectSearch, weighed: Sequence[WeighedExplanation], by: OddsCalibration
+) -> list[WeighedExplanation]:
     """Explanations with the share that their effects take, and how far these are to be trusted."""
     rig, made = search.problem.stack.rig, []
     for w in weighed:
@@ -139,7 +145,7 @@ def trusting(search: Search, weighed: Sequence[Weighed], by: Calibration) -> lis
 
 
 def _standing(
-    search: Search, best: Weighed, kept: Sequence[str], by: Calibration
+    search: EffectSearch, best: WeighedExplanation, kept: Sequence[str], by: OddsCalibration
 ) -> tuple[Model, float]:
     """The model of the names that are accepted, and the share that they take: where some of the
     best are not, the others must stand without them.
@@ -160,7 +166,7 @@ def _standing(
     return (model, share) if stands else (search.bare, 0.0)
 
 
-def _best(weighed: Sequence[Weighed]) -> Weighed:
+def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:
     """The likeliest explanation of the likeliest number of effects: many alike sets of two weigh
     together against one. Of equally likely ones the one with the fewest parameters.
     """
@@ -178,8 +184,8 @@ def _parameters(model: Model) -> int:
     return len(model.fitted.free)
 
 
-def _together(weighed: Sequence[Weighed]) -> dict[frozenset[str], float]:
-    """Probability of each set of effects, with functions without a name beside it and without."""
+def _together(weighed: Sequence[WeighedExplanation]) -> dict[frozenset[str], float]:
+    """Probability of each set of effects, with unexplained terms beside it and without."""
     out: dict[frozenset[str], float] = {}
     for w in weighed:
         of = frozenset(w.names)
@@ -187,21 +193,21 @@ def _together(weighed: Sequence[Weighed]) -> dict[frozenset[str], float]:
     return out
 
 
-def _weight(weighed: Sequence[Weighed], of: Weighed) -> float:
+def _weight(weighed: Sequence[WeighedExplanation], of: WeighedExplanation) -> float:
     """Probability of the set of effects of an explanation, resembled or there."""
     return _together(weighed)[frozenset(of.names)]
 
 
-def _trust(weighed: Sequence[Weighed], best: Weighed) -> dict[str, float]:
-    """Of each effect of the best explanation, how far it is to be trusted, with functions without
-    a name beside it and without.
+def _trust(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> dict[str, float]:
+    """Of each effect of the best explanation, how far it is to be trusted, with unexplained terms
+    beside it and without.
     """
     alike = [w for w in weighed if set(w.names) == set(best.names)]
     total = max(sum(w.probability for w in alike), SPAN)
     return {name: sum(w.probability * w.trusts[name] for w in alike) / total for name in best.names}
 
 
-def taken_share(search: Search, model: Model) -> float:
+def taken_share(search: EffectSearch, model: Model) -> float:
     """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
     leaves when its effects are switched off and all else stays. Other forms of an effect do not
     count, but for zeros, which no law tells how to go.
@@ -218,7 +224,7 @@ def taken_share(search: Search, model: Model) -> float:
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 
 
-def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
+def _probabilities(weighed: Sequence[WeighedExplanation]) -> dict[str, float]:
     """Weight of all explanations that hold an effect, as far as it is to be trusted in each."""
     out: dict[str, float] = {}
     for w in weighed:
@@ -227,12 +233,12 @@ def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
     return out
 
 
-def _unlisted(weighed: Sequence[Weighed]) -> float:
+def _unlisted(weighed: Sequence[WeighedExplanation]) -> float:
     """Probability that none of the effects of the true explanation is there."""
     return sum(w.probability * (1.0 - w.listed) for w in weighed)
 
 
-def _quiet(search: Search, screen: Screen) -> dict[str, float]:
+def _quiet(search: EffectSearch, screen: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: of each effect by the screen's evidence, against none."""
     listed = [n for n in screen.effects.effects]
     gains = np.array([screen.effects.gain(name) for name in listed])
@@ -242,7 +248,7 @@ def _quiet(search: Search, screen: Screen) -> dict[str, float]:
     return dict(zip(listed, shares.tolist(), strict=False))
 
 
-def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:
+def _groups(weighed: Sequence[WeighedExplanation], best: Model) -> dict[str, tuple[str, ...]]:
     """For each effect of the best model, those that could stand in its place."""
     together = _together(weighed)
     sized = [w for w in weighed if len(w.names) == len(best.names) and not w.nameless]
@@ -263,7 +269,7 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
     return out
 
 
-def power(search: Search, screen: Screen) -> float:
+def power(search: EffectSearch, screen: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size; those that change
     nothing measured would not. Beside a reference that was driven elsewhere little would.
     """

@@ -13,11 +13,11 @@ Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 
 
 @dataclass(frozen=True)
-class Weighed:
+class WeighedExplanation:
     """An explanation and its evidence above the bare model's [nats].
 
     names:    listed effects; none for the discrepancy of form alone.
-    functions: how many functions without a name act beside them.
+    functions: how many unexplained terms act beside them.
     share:    of the misfit that the effects take.
     trust:    of each effect, the probability that it is there and nothing that resembles it, if
         this explanation is the best.
@@ -33,7 +33,7 @@ class Weighed:
 
     @property
     def nameless(self) -> bool:
-        """Whether functions without a name act beside the effects."""
+        """Whether unexplained terms act beside the effects."""
         return self.functions > 0
 
     @property
@@ -72,5 +72,5 @@ class Decision:
     probability: dict[str, float]
     unlisted: float
     groups: dict[str, tuple[str, ...]]
-    weighed: tuple[Weighed, ...] = ()
+    weighed: tuple[WeighedExplanation, ...] = ()
     resembled: tuple[Resembled, ...] = ()

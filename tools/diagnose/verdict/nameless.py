@@ -45,7 +45,7 @@ def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
 
 
 def nameless_functions(screening: Screening, model: Model) -> list[Signature]:
-    """Functions without a name that act together beside a model."""
+    """Unexplained terms that act together beside a model."""
     return _chosen(screening, model)[0]
 
 

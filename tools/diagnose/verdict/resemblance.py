@@ -22,13 +22,13 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.search.calibration import Calibration
+from gritd.tools.diagnose.search.calibration import OddsCalibration
 from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
 
-def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[float, ...]:
+def trusted(rig: Rig, model: Model, share: float, by: OddsCalibration) -> tuple[float, ...]:
     """Of each effect of a model, the probability that it is there, if the model is the best
     explanation and takes such a share of the misfit.
     """

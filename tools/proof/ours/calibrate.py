@@ -28,7 +28,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.guard import guarded
-from gritd.tools.diagnose.search.calibration import Calibration, table_of
+from gritd.tools.diagnose.search.calibration import OddsCalibration, table_of
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
@@ -83,7 +83,7 @@ def _true(names: Sequence[str], truth: Sequence[str], held: Collection[str]) -> 
     return len(named & asked) / len(named | asked)
 
 
-def log_truth(case: WeighedCase, by: Calibration) -> float:
+def log_truth(case: WeighedCase, by: OddsCalibration) -> float:
     """Log probability of the truth of a case."""
     weight = replace(by, candidates=case.candidates).weights(
         case.evidence, case.count, case.nameless
@@ -92,13 +92,13 @@ def log_truth(case: WeighedCase, by: Calibration) -> float:
     return float(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * given_truth))
 
 
-def calibration(x: Array) -> Calibration:
+def calibration(x: Array) -> OddsCalibration:
     """From the unknowns of the search (5,)."""
     temperature, listed, more, nameless, lapse = x.tolist()
-    return Calibration(float(np.exp(temperature)), listed, more, nameless, float(expit(lapse)))
+    return OddsCalibration(float(np.exp(temperature)), listed, more, nameless, float(expit(lapse)))
 
 
-def learn(cases: Sequence[WeighedCase]) -> tuple[Calibration, float]:
+def learn(cases: Sequence[WeighedCase]) -> tuple[OddsCalibration, float]:
     """The calibration, and its mean log score over the cases [nats]."""
 
     def loss(x: Array) -> float:

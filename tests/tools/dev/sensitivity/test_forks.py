@@ -82,7 +82,7 @@ def test_some_numbers_move_something_and_some_end_early(
 
 
 def test_the_numbers_are_as_they_were(forked: dict[str, Any]) -> None:
-    assert type(TUNING.rig).__name__ == "Rig"
+    assert type(TUNING.rig).__name__ == "RigTuning"
 
 
 def test_a_child_does_not_end_while_its_number_is_still_read(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a reader should doubt is told, and no more."""
+"""What a reader should doubt is reported, and no more."""
 
 from __future__ import annotations
 

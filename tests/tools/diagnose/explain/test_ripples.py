@@ -11,17 +11,19 @@ from gritd.tools.diagnose.explain.result import plain
 from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
 from gritd.tools.diagnose.orders.campaigns import Lines
 from gritd.tools.diagnose.orders.latency import Latency
-from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.wave import Amplitude
 from gritd.tools.diagnose.rig.constants import UNITS
 
 
-def _line(channel: str, axis: str, at: float, harmonic: float = 0.0) -> Line:
+def _line(channel: str, axis: str, at: float, harmonic: float = 0.0) -> SpectralLine:
     size = (Amplitude(0.3, 0.4, 0.01), None)
-    return Line(channel, axis, at, 0.01, size, 1e-9, (1.0, 2.0), 0.2, 20.0, harmonic)
+    return SpectralLine(channel, axis, at, 0.01, size, 1e-9, (1.0, 2.0), 0.2, 20.0, harmonic)
 
 
-def _rig(new: tuple[Line, ...], reference: tuple[Line, ...] = (), **more: Any) -> Any:
+def _rig(
+    new: tuple[SpectralLine, ...], reference: tuple[SpectralLine, ...] = (), **more: Any
+) -> Any:
     return SimpleNamespace(lines=Lines(new, reference), units=UNITS, **more)
 
 

@@ -1,4 +1,4 @@
-"""The soil that is told is that of the campaign in question."""
+"""The soil that is reported is that of the campaign in question."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def test_a_channel_that_is_foretold_worse_comes_first() -> None:
 def test_it_says_which_name_has_rivals(names: tuple[str, ...]) -> None:
     decision = _decision("explained", *names, groups={names[-1]: ("d", "c")})
     told = summary(decision, [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
-    assert "cannot be told apart from c, d" in told
+    assert "cannot be distinguished from c, d" in told
     alone = summary(_decision("explained", *names), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
     assert "told apart" not in alone
 

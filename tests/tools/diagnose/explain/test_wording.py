@@ -1,4 +1,4 @@
-"""What a misfit is told to be, in words."""
+"""What a misfit is reported to be, in words."""
 
 from __future__ import annotations
 

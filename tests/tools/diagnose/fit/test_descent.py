@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.descent import Bounds, descend
+from gritd.tools.diagnose.fit.descent import CoordinateBounds, descend
 
 UNKNOWNS = 12
 FAR = 8.0  # bounds
@@ -24,7 +24,7 @@ class _Place:
 
 
 class _Bowl:
-    """½ |A x − b|² in nats, with unknowns that can hardly be told apart."""
+    """½ |A x − b|² in nats, with unknowns that can hardly be distinguished."""
 
     curved = np.zeros(UNKNOWNS, bool)
 
@@ -32,7 +32,7 @@ class _Bowl:
         directions = np.linalg.qr(rng.standard_normal((UNKNOWNS, UNKNOWNS)))[0]
         self.a = directions * np.geomspace(1.0, 300.0, UNKNOWNS) @ directions.T
         self.b = self.a @ (2.0 * FAR * rng.standard_normal(UNKNOWNS))
-        self.bounds = Bounds(np.full(UNKNOWNS, -FAR), np.full(UNKNOWNS, FAR))
+        self.bounds = CoordinateBounds(np.full(UNKNOWNS, -FAR), np.full(UNKNOWNS, FAR))
 
     def tried(self, centre: Array) -> tuple[Array, float]:
         return centre, 0.5 * float(np.sum((self.a @ centre - self.b) ** 2))
@@ -66,7 +66,7 @@ class _Bend:
     steep: of the valley's flanks.
     """
 
-    bounds = Bounds(np.full(2, -20.0), np.full(2, 20.0))
+    bounds = CoordinateBounds(np.full(2, -20.0), np.full(2, 20.0))
 
     def __init__(self, told: bool, steep: float = 10.0) -> None:
         """told: whether the descent knows along which unknown the valley is curved."""
@@ -133,7 +133,7 @@ class _Hidden:
     """½ |r|² of r = (x − ½, 1 − x y, y/100): at x = 0 nothing shows that y could gain."""
 
     curved = np.zeros(2, bool)
-    bounds = Bounds(np.full(2, -20.0), np.full(2, 20.0))
+    bounds = CoordinateBounds(np.full(2, -20.0), np.full(2, 20.0))
 
     def tried(self, centre: Array) -> tuple[Array, float]:
         return centre, 0.5 * float(np.sum(self._residual(centre) ** 2))

@@ -10,7 +10,7 @@ import pytest
 from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
 from gritd.tools.diagnose.orders.lines import find_lines
 from gritd.tools.diagnose.orders.on_grid import on_grid
-from gritd.tools.diagnose.orders.stretches import TURN, Motion, Samples, steady_samples
+from gritd.tools.diagnose.orders.stretches import TURN, GridMotion, Samples, steady_samples
 from tests.tools.diagnose.orders.made import RATE, campaign, readings
 
 
@@ -107,7 +107,7 @@ def test_on_the_grid_a_ripple_stands_as_it_is_at_its_times() -> None:
     values = 3.0 + 0.4 * np.cos(73.0 * angle + 1.0)
     values = values + 0.01 * np.random.default_rng(8).standard_normal(time.size)
     middle = np.arange(0.05, 20.0, 0.1)
-    motion = Motion(middle, np.full(middle.size, 0.5 * TURN), np.full(middle.size, 1.0))
+    motion = GridMotion(middle, np.full(middle.size, 0.5 * TURN), np.full(middle.size, 1.0))
 
     runs = [steady_samples(motion, (time, angle), {"torque": (time, values)})]
     lines = find_lines(runs)
@@ -120,7 +120,7 @@ def test_on_the_grid_a_ripple_stands_as_it_is_at_its_times() -> None:
 def test_a_wheel_that_stands_or_speeds_up_is_not_steady() -> None:
     middle = np.arange(0.05, 12.0, 0.1)
     speed = np.interp(middle, [0.0, 2.0, 2.5, 6.0, 7.0, 10.0, 10.2, 12.0], [0, 0, 1, 1, 2, 2, 0, 0])
-    motion = Motion(middle, speed, speed)
+    motion = GridMotion(middle, speed, speed)
     time = np.arange(0.0, 12.0, 1.0 / RATE)
     own = steady_samples(motion, (time, np.zeros(time.size)), {"load": (time, time)})["load"]
     spans = [(own.time[s][0], own.time[s][-1]) for s in own.slices]

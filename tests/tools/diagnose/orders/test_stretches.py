@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from gritd.tools.diagnose.orders.stretches import Motion, stretches
+from gritd.tools.diagnose.orders.stretches import GridMotion, stretches
 
 TIME = np.arange(0.05, 30.0, 0.1)
 DRIVEN = np.full(TIME.size, 0.3)
 
 
 def _ends(load: np.ndarray) -> list[tuple[float, float]]:
-    begins, ends = stretches(Motion(TIME, DRIVEN, DRIVEN, load))
+    begins, ends = stretches(GridMotion(TIME, DRIVEN, DRIVEN, load))
     return [(round(float(b), 1), round(float(e), 1)) for b, e in zip(begins, ends, strict=True)]
 
 

@@ -16,13 +16,13 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import Search, begin
+from gritd.tools.diagnose.search.search import EffectSearch, begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
 
 @cache
-def begun() -> Search:
+def begun() -> EffectSearch:
     """A campaign in which soil is pushed ahead of the wheel."""
     rig = WheelRig(record(plan(), (make("bulldozing", {"share": 0.75}),)), settings())
     return begin(prepare_screening(fit_base(rig)))

@@ -23,7 +23,7 @@ from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.scans import candidates
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import Search, begin
+from gritd.tools.diagnose.search.search import EffectSearch, begin
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import NextDoor, RailJointDrag
 from tests.tools.diagnose.campaigns import plan
@@ -80,7 +80,7 @@ def test_a_line_is_no_noise() -> None:
 
 
 @cache
-def begun(effect: type[Effect] | None, size: float) -> Search:
+def begun(effect: type[Effect] | None, size: float) -> EffectSearch:
     """The search after its first screen."""
     drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
     rig = WheelRig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)

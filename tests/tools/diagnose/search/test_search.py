@@ -22,8 +22,8 @@ from gritd.tools.diagnose.screen.evidence import Weighed, varied_pass
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search import search as searching
 from gritd.tools.diagnose.search.search import (
+    EffectSearch,
     Promise,
-    Search,
     _free_near,
     _promises,
     _retested,
@@ -36,7 +36,7 @@ from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
 
-def searched(acting: Effect | None, **given: Any) -> Search:
+def searched(acting: Effect | None, **given: Any) -> EffectSearch:
     """Recordings in which an effect acts, or none, after the first pass."""
     rig = WheelRig(record(plan(**given), (acting,) if acting else ()), settings())
     return begin(prepare_screening(fit_base(rig)))
@@ -74,12 +74,12 @@ def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> N
 
 
 def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its rivals are fitted, and it is told which one failed."""
+    """Its rivals are fitted, and it is reported which one failed."""
     bare = Model(cast(Any, None))
     every = [offered(bare, name, [0.0]) for name in ("coulomb_friction", "bulldozing")]
     monkeypatch.setattr(searching, "_promises", lambda *_: every)
 
-    def fitted(_: Search, promise: Promise) -> Model:
+    def fitted(_: EffectSearch, promise: Promise) -> Model:
         if promise.effect == "bulldozing":
             raise np.linalg.LinAlgError("Eigenvalues did not converge")
         return replace(promise.model, names=(promise.effect,))
@@ -88,7 +88,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     rig = SimpleNamespace(aside=nullcontext, effects=dict.fromkeys(EFFECTS))
     problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), allowance=SimpleNamespace(parts=()))
     screening: Any = SimpleNamespace(problem=problem, forms=())
-    search = Search(screening, (bare, bare), cast(Any, None))
+    search = EffectSearch(screening, (bare, bare), cast(Any, None))
 
     found = extended(search, [bare], 3, 1)
     assert [model.names for model in found.models[2:]] == [("coulomb_friction",)]

@@ -88,16 +88,16 @@ class Fit:
 
 
 def _judged(listed: float, nameless: float, trust: float, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """One effect that is so far to be trusted against functions without a name, of so much evidence
+    """One effect that is so far to be trusted against unexplained terms, of so much evidence
     each [nats].
     """
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, best = Fit(()), Fit(("a",))
     search: Any = SimpleNamespace(bare=bare, screening=None)
     weighed: Any = [
-        decide.Weighed(bare, (), 0, 0.0),
-        decide.Weighed(best, ("a",), 0, listed, 0.0, 0.9, (trust,)),
-        decide.Weighed(bare, (), 1, nameless),
+        decide.WeighedExplanation(bare, (), 0, 0.0),
+        decide.WeighedExplanation(best, ("a",), 0, listed, 0.0, 0.9, (trust,)),
+        decide.WeighedExplanation(bare, (), 1, nameless),
     ]
     return decide.judged(search, weighed, {}, learnt(30))
 
@@ -126,8 +126,8 @@ def test_no_name_is_stated_that_is_less_likely_than_none(monkeypatch: pytest.Mon
     by, names = learnt(30), "abc"
     bare, every = Fit(()), [Fit((name,)) for name in names]
     even = by.temperature * (by.nameless - by.listed + np.log(30))
-    listed = [decide.Weighed(cast(Any, fit), fit.names, 0, even - 1.0) for fit in every]
-    none = decide.Weighed(cast(Any, bare), (), 1, 0.0)
+    listed = [decide.WeighedExplanation(cast(Any, fit), fit.names, 0, even - 1.0) for fit in every]
+    none = decide.WeighedExplanation(cast(Any, bare), (), 1, 0.0)
     found = decide.judged(
         cast(Any, SimpleNamespace(bare=bare, screening=None)), [none, *listed], {}, by
     )
@@ -142,8 +142,8 @@ def test_of_equals_the_simplest_comes_first(monkeypatch: pytest.MonkeyPatch) -> 
     search: Any = SimpleNamespace(bare=bare, screening=None)
     for more, first in ((1.0, "plain"), (20.0, "richer")):
         weighed: Any = [
-            decide.Weighed(richer, richer.names, 0, 900.0 + more),
-            decide.Weighed(plain, plain.names, 0, 900.0),
+            decide.WeighedExplanation(richer, richer.names, 0, 900.0 + more),
+            decide.WeighedExplanation(plain, plain.names, 0, 900.0),
         ]
         assert decide.judged(search, weighed, {}, learnt(30)).best.names == (first,)
 
@@ -164,9 +164,11 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     by = learnt(30)
     weighed: Any = [
-        decide.Weighed(bare, (), 1, 900.0 - by.temperature * by.nameless),
-        decide.Weighed(one, ("a",), 0, 900.0 - by.temperature * (by.listed - np.log(30))),
-        decide.Weighed(
+        decide.WeighedExplanation(bare, (), 1, 900.0 - by.temperature * by.nameless),
+        decide.WeighedExplanation(
+            one, ("a",), 0, 900.0 - by.temperature * (by.listed - np.log(30))
+        ),
+        decide.WeighedExplanation(
             two,
             ("a", "b"),
             False,
@@ -178,17 +180,17 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
 
 
 def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A companion gains little, and functions without a name gain much beside either model."""
+    """A companion gains little, and unexplained terms gain much beside either model."""
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     alone: Any = [
-        decide.Weighed(one, ("a",), 0, 900.0),
-        decide.Weighed(two, ("a", "b"), 0, 905.0),
-        decide.Weighed(two, ("a", "b"), 1, 1005.0),
+        decide.WeighedExplanation(one, ("a",), 0, 900.0),
+        decide.WeighedExplanation(two, ("a", "b"), 0, 905.0),
+        decide.WeighedExplanation(two, ("a", "b"), 1, 1005.0),
     ]
     search: Any = SimpleNamespace(bare=bare, screening=None)
     assert decide.judged(search, alone, {}, learnt(30)).best is two
-    alone.append(decide.Weighed(one, ("a",), 1, 1000.0))
+    alone.append(decide.WeighedExplanation(one, ("a",), 1, 1000.0))
     assert decide.judged(search, alone, {}, learnt(30)).best is one
 
 

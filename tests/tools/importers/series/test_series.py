@@ -1,4 +1,4 @@
-"""Tables as laboratories write them, and what a user is told of those that cannot be read."""
+"""Tables as laboratories write them, and what a user is reported of those that cannot be read."""
 
 from __future__ import annotations
 

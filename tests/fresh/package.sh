@@ -35,7 +35,7 @@ timed "apt remove" sh -c 'apt-get remove -y -qq gritd >/dev/null'
 same "$(ls -d /usr/lib/gritd /usr/bin/gritd /usr/lib/systemd/system/gritd.service 2>/dev/null)" ""
 same "$(config)" mine
 ls /var/lib/gritd/*.mcap
-timed "install again" packages "$one"
+timed "install again" packages "$two"
 same "$(config)" mine
 
 # Purged: the recordings alone stay.

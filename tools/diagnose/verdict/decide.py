@@ -111,7 +111,7 @@ def judged(
     probability, unlisted = _probabilities(every), _unlisted(every)
     best = _best([w for w in every if w.names] or every)
     trust = _trust(every, best)
-    least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is told, too
+    least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
     kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
     told, share = _standing(search, best, kept, calibration)
     if told not in beside:

@@ -62,7 +62,6 @@ def test_coloured_noise_of_unknown_size_gives_no_alarm(
     ]
 
 
-@pytest.mark.slow
 def test_what_the_soil_absorbs_shows_as_strain() -> None:
     """A rear contact hides in c: named from the strain against the prior, and c comes back."""
     found = diagnosed(
@@ -74,7 +73,6 @@ def test_what_the_soil_absorbs_shows_as_strain() -> None:
     assert abs(after.value - soil().cohesion) < 2.0 * after.sigma
 
 
-@pytest.mark.slow
 def test_without_standstill_offset_and_friction_are_one_group() -> None:
     found = diagnosed(plan(standstill=False), (make("coulomb_friction", {"loss": 0.25}),))
     assert {"coulomb_friction", "current_offset"} <= group(found)
@@ -82,13 +80,11 @@ def test_without_standstill_offset_and_friction_are_one_group() -> None:
     assert found.next_experiment.key in ("standstill", "lifted_spin", "reversal")
 
 
-@pytest.mark.slow
 def test_slope_and_crosstalk_are_one_group() -> None:
     found = diagnosed(plan(), (make("bed_slope", {"angle": 0.03}),))
     assert {"bed_slope", "force_crosstalk"} <= group(found)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stranger", [BentRail(size=1e-3), CableChainDrag(size=8.0)])
 def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableChainDrag) -> None:
     found = diagnosed(plan(), (stranger,))
@@ -96,7 +92,6 @@ def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableChainDr
     assert max(h.probability for h in found.hypotheses) <= 0.5
 
 
-@pytest.mark.slow
 def test_no_force_sensor_degrades_honestly() -> None:
     """What shows in the drawbar pull alone cannot show; no other name is given."""
     found = diagnosed(plan(wrench=False), (make("side_wall_rubbing", {"share": 0.04}),))
@@ -113,7 +108,6 @@ def test_repeats_do_not_leak() -> None:
         assert not set(np.round(load[fold])) & set(np.round(load[~fold]))
 
 
-@pytest.mark.slow
 def test_an_applied_effect_is_the_next_baseline() -> None:
     """After --apply the same testbed is consistent, and something new on top of it is what is
     named.

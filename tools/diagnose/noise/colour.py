@@ -189,6 +189,11 @@ def _log_det(recursion: tuple[Array, Array, Array]) -> Array:
     return np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
+def innovation_variance(gaps: Array, colours: Sequence[Colour]) -> Array:
+    """Usual variance (g,) of an innovation of noise of each colour and unit variance."""
+    return np.asarray(np.median(_recursion(gaps, colours)[2] ** 2, axis=0))
+
+
 def _recursion(
     gaps: Array, colours: Sequence[Colour], beside: Array | None = None
 ) -> tuple[Array, Array, Array]:

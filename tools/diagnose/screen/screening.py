@@ -10,13 +10,14 @@ The chance of a likelihood ratio above R by noise alone is 1/R at most (Markov's
 ln 100 is an alarm that is false once in a hundred campaigns. An effect is tried beside the exact
 model too. Where δ is known to be there, as the configuration holds one that was learnt or a
 reference campaign shows it, the alarm is that of effects and the unexplained against Z_δ, and must
-be more than what the runs of the reference would raise (usual.py).
+be more than what the runs of the reference would raise (usual.py). Without a reference, which shows
+the noise, something of it must be more than noise of any colour as well (open_colour.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -30,9 +31,11 @@ from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.fit.signatures import some_of
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.evidence import Pass, one_pass
 from gritd.tools.diagnose.screen.gram import Gram
+from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
 from gritd.tools.diagnose.screen.usual import unnamed_in_both, usual
 from gritd.tools.diagnose.tuning import TUNING
@@ -96,6 +99,7 @@ class Screen:
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     strain: [σ] of the constant that stands farthest from what is known of it, and its name.
     usual:  what so many runs of a reference would raise [nats] (usual.py).
+    open:   the largest log Bayes factor of what stands out with the noise's colour open [nats].
     """
 
     effects: Pass
@@ -106,6 +110,7 @@ class Screen:
     strain: float
     usual: float = 0.0
     constant: str = ""
+    open: float = np.inf
 
     @property
     def evidence(self) -> dict[Candidate, float]:
@@ -160,7 +165,8 @@ class Screen:
     def p(self) -> float:
         """The largest chance that noise alone could give of what is seen."""
         beyond = max(self.ratio - self.usual, 0.0)
-        return float(min(np.exp(-beyond), self.ripple, self.strained))
+        open_ = min(TUNING.screen.kinds * float(np.exp(-max(self.open, 0.0))), 1.0)
+        return float(min(max(np.exp(-beyond), open_), self.ripple, self.strained))
 
     @property
     def strained(self) -> float:
@@ -171,7 +177,8 @@ class Screen:
     @property
     def on_grid(self) -> bool:
         """Whether something stands out on the grid, or a constant strains beyond belief."""
-        return self.ratio > self.threshold or self.strain > TUNING.screen.beyond
+        outstanding = self.ratio > self.threshold and self.open > TUNING.screen.sure
+        return outstanding or self.strain > TUNING.screen.beyond
 
     @property
     def alarmed(self) -> bool:
@@ -193,7 +200,33 @@ def screen(screening: Screening, bare: Model, jobs: int = 1) -> Screen:
     strained = bare if formed else screening.base
     strain, constant = strain_of(problem, strained)
     shown = usual(problem, bare, effects) if problem.stack.referred else 0.0
-    return Screen(effects, unexplained, exact, formed, ripple, strain, shown, constant)
+    found = Screen(effects, unexplained, exact, formed, ripple, strain, shown, constant)
+    if not found.on_grid or problem.stack.referred or rig.tabled:
+        return found
+    null = bare if formed else screening.base
+    return replace(found, open=_open(screening, null, bare, found, jobs))
+
+
+def _open(screening: Screening, null: Model, bare: Model, found: Screen, jobs: int) -> float:
+    """The evidence beside the null of what stands out beside the bare model, with the noise's
+    colour open [nats]; one that is enough ends the search. What is likeliest with one colour need
+    not be what slow noise cannot be, so all are weighed.
+
+    jobs: processes.
+    """
+    shapes = [(s.shape.family, s) for s in screening.shapes(bare)]
+    every: list[tuple[Candidate, Signature]] = [*found.best.items(), *shapes]
+    ranked = sorted(every, key=lambda one: -found.evidence[one[0]])
+    standing = [s for of, s in ranked if found.evidence[of] > 0.0]
+
+    most = -np.inf
+    for some in some_of(standing):
+        weighed = OpenNoise(screening.problem, null.fitted, some, jobs)
+        for number in range(len(some)):
+            most = max(most, weighed.gain(number))
+            if most > TUNING.screen.sure:
+                return most
+    return most
 
 
 def _exact(screening: Screening, bare: Model) -> float:

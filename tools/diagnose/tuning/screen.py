@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from gritd.tools.diagnose.tuning.field import tuned
+
+COLOUR_SIZES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5)
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,15 @@ class ScreenTuning:
     # --- ripples.py ---
     loudest: int = tuned(10, "orders", "whose physics is simulated", "run time")
 
+    # --- open_colour.py ---
+    colour_sizes: tuple[float, ...] = tuned(
+        COLOUR_SIZES, "-", "of the noise, beside what suits a channel for itself"
+    )
+    colour_near: float = tuned(
+        10.0, "nats", "a colour so far behind the best for a channel alone is not tried in it"
+    )
+    colour_sweeps: int = tuned(2, "sweeps", "over the channels")
+
     # --- covered.py ---
     coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
     coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
@@ -47,3 +60,10 @@ class ScreenTuning:
     ripple_harmonics: int = tuned(4, "harmonics", "of a ripple that is known")
     large_ripple: float = tuned(3.0, "-", "their standard deviation in expected sizes")
     frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")
+
+    @property
+    def sure(self) -> float:
+        """A likelihood ratio [nats] that is chance as rarely as an alarm is false, in any kind of
+        misfit.
+        """
+        return float(np.log(self.kinds / self.level))

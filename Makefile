@@ -7,7 +7,7 @@ JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall release lock wheel deb clean
+.PHONY: help venv demo test long tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall release lock wheel deb clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -30,8 +30,11 @@ demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
 	@$(BIN)/gritd demo
 
 # a worker more than two cores: some tests wait for real time
-test: $(READY) ## the tests, without the slow ones
-	@$(BIN)/python -m pytest --quiet -n 3
+test: $(READY) ## the tests that a change needs at once
+	@$(BIN)/python -m pytest --quiet -n 3 -m "not long and not slow"
+
+long: $(READY) ## whole campaigns, benches, worlds and faults: what decides a verdict, with every submission
+	@$(BIN)/python -m pytest --quiet -n 3 -m "long and not slow"
 
 tutorial: $(READY) ## the pages and notebooks of docs/first-day and docs/your-data, word for word
 	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs

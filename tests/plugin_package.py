@@ -67,7 +67,7 @@ def run(args, tell):
 READING = """
 from gritd.config import packaged
 from gritd.drivers.decoder import Decoder
-from gritd.drivers.framing import Counts, Frame
+from gritd.drivers.framing import Frame
 from gritd.drivers.guarded import made
 from gritd.drivers.sensor import sensor_kinds
 from gritd.estimator.config.configuration import load

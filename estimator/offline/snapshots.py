@@ -392,13 +392,7 @@ def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> in
 
     t, x = (stamp - stamp[0]).tolist(), (counts - counts[0]).tolist()
     spread = count * integer_sum([a * a for a in t]) - integer_sum(t) ** 2
-    rate = (
-        (
-            count * integer_sum([a * b for a, b in zip(t, x, strict=True)])
-            - integer_sum(t) * integer_sum(x)
-        )
-        / spread
-        * NS
-    )
+    products = integer_sum([a * b for a, b in zip(t, x, strict=True)])
+    rate = (count * products - integer_sum(t) * integer_sum(x)) / spread * NS
     expected: int = round(rate * elapsed / NS)
     return expected

@@ -156,18 +156,12 @@ def _families(
 
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     spans = [np.arange(start, end) for start, end in pairwise(ends.tolist())]
-    means = {
-        shape.channel: own
-        for shape, own in zip(shapes, spans, strict=True)
-        if shape.along == ("constant",)
-    }
-    spans = [
-        np.union1d(own, means[shape.channel]) for shape, own in zip(shapes, spans, strict=True)
-    ]
-    families = [
-        CovariateFamily(shape, own, *projected.gain(own))
-        for shape, own in zip(shapes, spans, strict=True)
-    ]
+    told = list(zip(shapes, spans, strict=True))
+    means = {shape.channel: own for shape, own in told if shape.along == ("constant",)}
+    families = []
+    for shape, own in told:
+        both = np.union1d(own, means[shape.channel])
+        families.append(CovariateFamily(shape, both, *projected.gain(both)))
 
     chance = _chance_of(screening, model, [w.shape.family for w in waves])
     first = len(smooth)
@@ -339,7 +333,7 @@ def _ripples(
         if size <= 0.0 or not here:
             continue
         left = _beside_smooth(screening, projection, channel, orders, here)
-        nats = [_pair(left, k, k + orders.size) for k in range(orders.size)]
+        nats = [_pair(left, k, k + orders.size)[0] for k in range(orders.size)]
         best = int(np.argmax(nats))
 
         # half of χ² of two degrees, the largest of so many (Bonferroni)
@@ -348,7 +342,7 @@ def _ripples(
         share = nats[best] / max(nats[best] + whole, SPAN)
         q = min(p * len(channels), 1.0)  # any of them may ripple by noise (Bonferroni)
         if q <= TUNING.screen.level and share >= TUNING.explain.least_share:
-            amplitude = size * _amplitude(left, best, best + orders.size)
+            amplitude = size * _pair(left, best, best + orders.size)[1]
             words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
             location = Location(channel, "wheel_angle", share, p, q, words)
             places.append(Place(nats[best], location))
@@ -377,19 +371,12 @@ def _beside_smooth(
     return projection.project_rows(ready, own).without_columns(beyond)
 
 
-def _pair(left: Projected, one: int, two: int) -> float:
-    """Nats that cosine and sine of an order gain."""
-    own = [one, two]
-    gained = np.linalg.solve(
-        left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2), left.b[own]
-    )
-    return 0.5 * float(left.b[own] @ gained)
-
-
-def _amplitude(left: Projected, one: int, two: int) -> float:
+def _pair(left: Projected, one: int, two: int) -> tuple[float, float]:
+    """Nats that cosine and sine of an order gain, and their amplitude in expected sizes."""
     own = [one, two]
     a = left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2)
-    return float(np.linalg.norm(np.linalg.solve(a, left.b[own])))
+    weights = np.linalg.solve(a, left.b[own])
+    return 0.5 * float(left.b[own] @ weights), float(np.linalg.norm(weights))
 
 
 def _strains(stack: Stack, model: Model) -> list[Place]:

@@ -175,14 +175,19 @@ def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array,
     """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors
     (s, p).
     """
-    variance = part.variance[:, None] * np.array(TUNING.screen.colour_sizes) ** 2
-    gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
-    added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
+    products, more = sum(o[0] for o in others), sum(o[1] for o in others)
     # the first columns have one prior, whatever the size of the rest: eliminated once
     alike = int(np.argmin(np.append(np.all(prior == prior[0], axis=0), False)))
-    rest, spread = _without_first(gram, prior[0, :alike])
-    every = [_log_evidence(rest, p[alike:]) for p in prior]
-    return np.asarray(logsumexp(every, axis=0) - np.log(len(prior)) - spread + added)
+
+    averaged = []
+    for size in TUNING.screen.colour_sizes:  # one at a time: the products take memory
+        variance = part.variance * size**2
+        gram = part.gram / variance[:, None, None] + products
+        rest, spread = _without_first(gram, prior[0, :alike])
+        every = [_log_evidence(rest, p[alike:]) for p in prior]
+        added = part.rest - 0.5 * part.count * np.log(variance) + more
+        averaged.append(logsumexp(every, axis=0) - np.log(len(prior)) - spread + added)
+    return np.stack(averaged, axis=1)
 
 
 def _without_first(gram: Array, prior: Array) -> tuple[Array, Array]:

@@ -203,12 +203,11 @@ def screen(screening: Screening, bare: Model, jobs: int = 1) -> Screen:
     found = Screen(effects, unexplained, exact, formed, ripple, strain, shown, constant)
     if not found.on_grid or problem.stack.referred or rig.tabled:
         return found
-    null = bare if formed else screening.base
-    return replace(found, open=_open(screening, null, bare, found, jobs))
+    return replace(found, open=_open(screening, bare, found, jobs))
 
 
-def _open(screening: Screening, null: Model, bare: Model, found: Screen, jobs: int) -> float:
-    """The evidence beside the null of what stands out beside the bare model, with the noise's
+def _open(screening: Screening, bare: Model, found: Screen, jobs: int) -> float:
+    """The evidence beside the base model of what stands out beside the bare one, with the noise's
     colour open [nats]; one that is enough ends the search. What is likeliest with one colour need
     not be what slow noise cannot be, so all are weighed.
 
@@ -221,7 +220,7 @@ def _open(screening: Screening, null: Model, bare: Model, found: Screen, jobs: i
 
     most = -np.inf
     for some in some_of(standing):
-        weighed = OpenNoise(screening.problem, null.fitted, some, jobs)
+        weighed = OpenNoise(screening.problem, screening.base.fitted, some, jobs)
         for number in range(len(some)):
             most = max(most, weighed.gain(number))
             if most > TUNING.screen.sure:

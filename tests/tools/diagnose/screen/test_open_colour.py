@@ -107,7 +107,7 @@ def test_what_no_slow_noise_can_be_counts_wherever_it_ranks(
             return 100.0 if self._of[number] == last else 1.0
 
     monkeypatch.setattr(module, "OpenNoise", _Open)
-    assert module._open(screening, search.base, model, found, 1) == 100.0
+    assert module._open(screening, model, found, 1) == 100.0
 
 
 def test_products_of_very_quiet_recordings_keep_their_root() -> None:

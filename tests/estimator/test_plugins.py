@@ -8,6 +8,8 @@ import pytest
 
 from tests.plugin_package import READING, SENSOR, made, offer, python
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:

@@ -15,6 +15,14 @@ SEEDS = (1, 2, 3)
 FIGURES = "GRITD_FIGURES"  # file that collects what is measured, one JSON line each
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Every scenario is a whole run."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.long)
+
+
 def pytest_generate_tests(metafunc):
     """A scenario that takes a seed is run with three; where it needs the daemon, two of them count
     as slow.

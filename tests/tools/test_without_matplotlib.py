@@ -13,6 +13,8 @@ import pytest
 from gritd.config import packaged
 from tests.scenarios.rig import driven, service
 
+pytestmark = pytest.mark.long
+
 BLOCKED = "import sys; sys.modules['matplotlib'] = None"  # as if it were not installed
 GRITD = f"{BLOCKED}; from gritd.tools.main import main; sys.exit(main(sys.argv[1:]))"
 CONFIG = ("--config", str(packaged()))

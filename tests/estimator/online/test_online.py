@@ -17,6 +17,8 @@ from gritd.tools.testbed.simulation import simulate_run, soil_of
 from tests.estimator.online.rig import SETTINGS, last_tick
 from tests.rig import TRIANGLES
 
+pytestmark = pytest.mark.long
+
 SOIL = soil_of(SETTINGS, {"cohesion": 750.0, "tan_phi": 0.62, "shear_modulus": 0.0225})
 MOTION = motion_of(schedule(45.0), SETTINGS.wheel.radius, 50.0)
 ACTING = sorted(

@@ -19,6 +19,8 @@ from gritd.tools.testbed import rig_config
 from gritd.tools.testbed.wires import ConnectedDevices
 from tests.tools.calibrate.bench import rig as described
 
+pytestmark = pytest.mark.long
+
 Raw = Mapping[str, float | int | tuple[float, ...]]
 RATE = 100.0  # [Hz]
 NS = 1e9

@@ -16,6 +16,8 @@ from gritd.tools.cli.files import recording
 from gritd.tools.commands.calibrate import main
 from tests.tools.calibrate.bench import SETTINGS, noisy, record, rig, staircase
 
+pytestmark = pytest.mark.long
+
 SEEDS = 60
 HEIGHTS = (0.0, 0.01, 0.02, 0.03, 0.05)
 Z = 4.5e-5  # [m] of a gauge block

@@ -15,6 +15,8 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import prove
 from gritd.tools.proof.blind import batch, trial
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[3]
 STUB = (sys.executable, "-m", "tests.tools.proof.blind.stub")
 DRAWN = ("case", "seed", "stratum", "effects", "soil", "habits", "runs", "chain", "noise_factor")

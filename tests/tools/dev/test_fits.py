@@ -9,6 +9,8 @@ import pytest
 from gritd.tools.dev import fits
 from gritd.tools.dev.fits import Compared, FitCase, FitOutcome
 
+pytestmark = pytest.mark.long
+
 OFF = "off by more than 0.5 nats from where the descent ended: "
 
 

@@ -21,6 +21,8 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 
 def _ripple(order: float) -> tuple[object, ...]:
     return (make("gear_ripple", {"ripple_cos": 0.1, "ripple_sin": 0.05, "order": order}),)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import pytest
+
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan
+
+pytestmark = pytest.mark.long
 
 
 def test_a_first_answer_names_the_strongest_and_says_so() -> None:

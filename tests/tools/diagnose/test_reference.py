@@ -19,6 +19,8 @@ from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 # a rig with a gear that rubs and ripples, and a wheel whose stress peaks elsewhere
 HABITS = (
     make("gear_ripple", {"ripple_cos": 0.15, "ripple_sin": 0.1, "order": 23.0}),

@@ -13,6 +13,8 @@ from gritd.estimator.messages.readings import CHANNELS
 from gritd.estimator.recording.salvage import read
 from tests.scenarios.rig import ROOT, DaemonProcess, Wires, driven, verified
 
+pytestmark = pytest.mark.long
+
 BUSES = ("slcan", "udp_multicast")
 
 

@@ -26,6 +26,8 @@ from gritd.tools.testbed.testbed import experiment, in_transit
 from gritd.tools.testbed.wires import ConnectedDevices, has_multicast
 from tests.drivers.rig import Ticking, wait_until
 
+pytestmark = pytest.mark.long
+
 TESTBED = config.load(packaged())
 NS = 1_000_000_000
 HELD_UP = 0.25  # [s]

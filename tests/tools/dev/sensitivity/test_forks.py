@@ -22,6 +22,8 @@ from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.proof.ours.cases import rig_of
 from tests.tools.diagnose.campaigns import plan
 
+pytestmark = pytest.mark.long
+
 NUMBERS = (
     "orders.level",
     "rig.blur",

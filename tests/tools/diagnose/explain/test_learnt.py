@@ -19,6 +19,8 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 
 def test_soil_at_its_bound_is_correlated_with_nothing() -> None:
     """A cohesion that is held at 0 has no width: that must not end a diagnosis."""

@@ -29,6 +29,8 @@ from gritd.tools.proof.ours.cases import draw, record
 from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
 
+pytestmark = pytest.mark.long
+
 PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
 
 

@@ -21,6 +21,8 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 
+pytestmark = pytest.mark.long
+
 
 def _stack() -> Stack:
     runs = record(plan(seed=3, seconds=40.0), (make("grousers", {"grip": 0.2}),))

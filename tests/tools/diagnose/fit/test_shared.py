@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.fit.shared import (
@@ -19,6 +20,8 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
+
+pytestmark = pytest.mark.long
 
 
 def test_the_reduced_columns_have_the_same_covariance() -> None:

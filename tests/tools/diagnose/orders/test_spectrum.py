@@ -15,6 +15,8 @@ from gritd.tools.diagnose.orders.wave import amplitude_of
 from gritd.tools.diagnose.tuning import replaced
 from tests.tools.diagnose.orders.made import campaign, readings, red
 
+pytestmark = pytest.mark.long
+
 
 @given(seed=st.integers(0, 1000), spacing=st.floats(0.01, 0.5), count=st.integers(1, 900))
 @settings(max_examples=30, deadline=None)

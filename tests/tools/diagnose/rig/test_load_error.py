@@ -16,6 +16,8 @@ from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 LEVEL = 40.0  # [N]
 
 

@@ -19,6 +19,8 @@ from gritd.tools.diagnose.rig.wheel import HOLDING_NOTE, LOSS_NOTE, WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import group, plan, settings
 
+pytestmark = pytest.mark.long
+
 LOSS = 0.8  # [N·m]
 
 

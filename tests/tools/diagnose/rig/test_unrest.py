@@ -24,6 +24,8 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 SHARE = 0.004  # of the speed
 
 

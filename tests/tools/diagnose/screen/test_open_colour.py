@@ -25,6 +25,8 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import Plan, record
 from tests.tools.diagnose.campaigns import plan
 
+pytestmark = pytest.mark.long
+
 
 def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     rng = np.random.default_rng(3)

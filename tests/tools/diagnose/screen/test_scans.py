@@ -28,6 +28,8 @@ from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import NextDoor, RailJointDrag
 from tests.tools.diagnose.campaigns import plan
 
+pytestmark = pytest.mark.long
+
 RUNS, LENGTH, STEP = 3, 250, 0.1
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from gritd.tools.diagnose.explain.result import Diagnosis, Discrepancy
 from tests.tools.diagnose.campaigns import diagnosed, plan, soil
+
+pytestmark = pytest.mark.long
 
 
 def _of_modulus(factor: float) -> Diagnosis:

@@ -35,6 +35,8 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
+pytestmark = pytest.mark.long
+
 
 def searched(acting: Effect | None, **given: Any) -> EffectSearch:
     """Recordings in which an effect acts, or none, after the first pass."""

@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import make
@@ -22,6 +23,8 @@ from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
+
+pytestmark = pytest.mark.long
 
 LAG = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.06})
 BEGINNING = make("running_in", {"pull": 0.3, "shallow": 0.3, "torque": 0.3, "length": 0.06})

@@ -19,6 +19,8 @@ from gritd.tools.proof.blind.plant.concealed.zeros import BentOffset
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import Assignment
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def null() -> cases.BlindCase:

@@ -24,6 +24,8 @@ from gritd.tools.proof.blind.plant.respond import drive, respond, responses
 from gritd.tools.proof.blind.plant.servo import Servo, follow
 from tests.tools.proof.blind.scene import FACTS, GROUND, RIG, WORLD, run
 
+pytestmark = pytest.mark.long
+
 Friction = Callable[[Array, Array, float], Array]
 FORMS = [form for forms in (LISTED | UNLISTED).values() for form in forms]
 READ = ("sinkage", "current", "pull", "load", "torque", "carriage", "side")

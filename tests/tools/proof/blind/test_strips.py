@@ -14,6 +14,8 @@ from gritd.tools.proof.blind.plant.scene import Felt, TrueMotion
 from gritd.tools.proof.blind.plant.strips import StripBed
 from tests.tools.proof.blind.scene import GROUND, RIG
 
+pytestmark = pytest.mark.long
+
 SPEED = 0.02  # of the rim [m/s]
 WORLD = World(RIG, GROUND, bed=StripBed())
 

@@ -15,6 +15,8 @@ from gritd.tools.proof.blind.plant.scene import Felt
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, HELD, WORLDS, Size
 from tests.tools.proof.blind.scene import FACTS, GROUND, RIG, run
 
+pytestmark = pytest.mark.long
+
 READ = ("sinkage", "current", "pull", "load", "torque", "carriage", "side")
 FORMS = [form for forms in (LISTED | UNLISTED).values() for form in forms]
 

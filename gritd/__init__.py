@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Filter", "__version__", "diagnose", "read", "simulate", "terramechanics"]
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 _HOME = {
     "Filter": "gritd.interface.filtering",

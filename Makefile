@@ -6,6 +6,9 @@ BIN    := $(VENV)/bin
 JOBS   ?= 2
 READY  := $(VENV)/.ready
 
+# tests start hundreds of Pythons, and each would compile all it imports
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help venv demo test long tutorial slow package lint format type docs man site proof scenarios coverage fuzz soak install uninstall release lock wheel deb clean
 

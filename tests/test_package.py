@@ -99,6 +99,7 @@ def names_in(wheel: Path) -> set[str]:
     return {name for name in ZipFile(wheel).namelist() if ".dist-info/" not in name}
 
 
+@pytest.mark.long
 def test_the_wheel_holds_every_file_but_those_for_development(wheel: Path) -> None:
     held = {name for name in names_in(wheel) if not name.endswith(".so")}
 
@@ -106,6 +107,7 @@ def test_the_wheel_holds_every_file_but_those_for_development(wheel: Path) -> No
 
 
 @pytest.mark.skipif(which("gcc") is None, reason="found no compiler")
+@pytest.mark.long
 def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel: Path) -> None:
     compiled = [name for name in names_in(wheel) if name.endswith(".so")]
     of_x86 = {"checksum"} if platform.machine() == "x86_64" else set()
@@ -119,6 +121,7 @@ def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel
     }
 
 
+@pytest.mark.long
 def test_without_a_compiler_the_wheel_is_built_all_the_same(
     checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,6 +131,7 @@ def test_without_a_compiler_the_wheel_is_built_all_the_same(
     assert not any(name.endswith(".so") for name in names_in(built("wheel", copy)))
 
 
+@pytest.mark.long
 def test_the_source_archive_holds_what_the_wheel_does(checkout: Path, wheel: Path) -> None:
     with tarfile.open(built("sdist", checkout)) as archive:
         names = [m.name.partition("/")[2] for m in archive.getmembers() if not m.isdir()]
@@ -190,6 +194,7 @@ def surrounded(tmp_path: Path, installed: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_every_module_is_imported_among_foreign_packages(installed: Path, surrounded: Path) -> None:
     done = run(installed, "-c", IMPORT_ALL, where=surrounded)
 

@@ -38,6 +38,7 @@ def test_the_python_prints_what_replay_believes_too(
     assert c is not None and f"  c          {c[1]}\n" in replayed
 
 
+@pytest.mark.long
 def test_three_lines_go_from_nothing_to_a_report_with_the_true_soil(tmp_path: Path) -> None:
     (block,) = EXAMPLE.findall(README.read_text(encoding="utf-8"))
     command = ["bash", "-ec", textwrap.dedent(block)]

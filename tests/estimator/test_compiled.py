@@ -155,6 +155,7 @@ def _line(rng, components, size):
     return Line(y, H, R, rows(_spread(rng, components)), (0.1, 1.0)[:components])
 
 
+@pytest.mark.long
 def test_ticks_are_those_of_python_to_the_bit(monkeypatch):
     consumed = live_run.consumed()
 

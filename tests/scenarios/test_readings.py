@@ -24,7 +24,6 @@ SETTINGS = TESTBED.settings
 START = 1_700_000_000_000_000_000
 TICK = 4_000_000  # [ns]
 REST = 1_400_000_000  # [ns] before a simulated run drives off
-QUICK = True  # all seeds in every run
 PIPELINE = "pipeline, readings simulated"
 DRIVERS = "drivers' decoders and pipeline, bytes simulated"
 ESTIMATE = (

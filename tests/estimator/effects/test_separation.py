@@ -16,6 +16,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("effect", "rival", "experiment"), PAIRS, ids="-".join)
+@pytest.mark.long
 def test_experiment_tells_apart(effect: str, rival: str, experiment: str) -> None:
     without, with_it = separation(effect, rival, experiment)
     assert with_it > 2.0 and with_it > without + 1.0

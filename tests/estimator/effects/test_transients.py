@@ -139,6 +139,7 @@ def test_the_motor_turns_freely_through_the_gap_after_each_reversal() -> None:
 
 
 @pytest.mark.parametrize("name", ALONE)
+@pytest.mark.long
 def test_runs_in_one_array_do_not_touch(name: str) -> None:
     """A campaign in one call is what its runs are one by one."""
     settings = replace(configuration.load(packaged()).settings, wheel=WHEEL, effects=())
@@ -154,6 +155,7 @@ def test_runs_in_one_array_do_not_touch(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(ALONE))
+@pytest.mark.long
 def test_readings_do_not_depend_on_what_was_read_before(name: str) -> None:
     """What the soil carries is solved once for all effects that do not bear on it."""
     settings = replace(configuration.load(packaged()).settings, wheel=WHEEL, effects=())

@@ -94,6 +94,7 @@ def test_the_mean_of_delta_brings_c_and_tan_phi_back():
     assert int(blind["flags"]) & Flag.PRIOR or np.abs(off(blind)).max() > 3.0
 
 
+@pytest.mark.long
 def test_what_delta_leaves_open_is_not_averaged_away():
     """δ drawn anew for every rig from what is left open: σ is true of the errors."""
     wide = forms.form(1, size=0.15, where=DRIVEN)

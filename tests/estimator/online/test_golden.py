@@ -64,6 +64,7 @@ OTHER = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the kernels are those of x86-64")
+@pytest.mark.long
 def test_the_ticks_are_the_same_to_the_bit_on_another_processor():
     """Without the instructions that OpenBLAS and numpy choose by the processor."""
 

@@ -69,6 +69,7 @@ def one_run(seed):
 
 
 @pytest.mark.parametrize("seeds, inside", [(6, 5), pytest.param(60, 54, marks=pytest.mark.slow)])
+@pytest.mark.long
 def test_a_rig_as_uncertain_as_stated_gives_estimates_as_uncertain_as_stated(seeds, inside):
     """Original plant, every calibration and the soil drawn from its own sigma, three loads."""
     squares, resets = zip(*(one_run(seed) for seed in range(seeds)), strict=True)

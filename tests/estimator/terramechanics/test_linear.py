@@ -44,6 +44,7 @@ def by_quadrature(theta_1: float, ratio: float, f: float, order: int = 60) -> np
     return total
 
 
+@pytest.mark.long
 def test_closed_forms_agree_with_quadrature_on_2000_random_draws() -> None:
     rng = np.random.default_rng(7)
     worst = 0.0
@@ -61,6 +62,7 @@ def test_closed_forms_agree_with_quadrature_on_2000_random_draws() -> None:
     assert worst < 1e-12
 
 
+@pytest.mark.long
 def test_forces_agree_with_quadrature_on_2000_random_draws() -> None:
     rng = np.random.default_rng(8)
     n = 2000

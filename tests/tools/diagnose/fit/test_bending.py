@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,9 +25,15 @@ from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 pytestmark = pytest.mark.long
 
 
+@cache
 def _stack() -> Stack:
     runs = record(plan(seed=3, seconds=40.0), (make("grousers", {"grip": 0.2}),))
     return Stack(WheelRig(runs, settings()))
+
+
+@cache
+def _problem() -> Problem:
+    return fit_base(_stack().rig).problem
 
 
 def test_an_effect_that_follows_is_within_its_freedom() -> None:
@@ -52,7 +59,7 @@ def test_an_effect_that_follows_is_within_its_freedom() -> None:
 def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     name: str, follows: bool
 ) -> None:
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, effect = problem.stack, EFFECTS[name]
     free = free_of((effect,))
     fitted = problem.descend(
@@ -91,7 +98,7 @@ def _drifting(zero: np.ndarray) -> float:
     """Share of a drift (N,) of the drawbar pull's zero that is outside the freedom of
     `sensor_drift`.
     """
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, effect = problem.stack, EFFECTS["sensor_drift"]
     free = free_of((effect,))
     start = np.array([float(f.parameter.name == "drawbar_pull") for f in free])
@@ -124,7 +131,7 @@ def test_an_effect_beside_others_that_run_away_has_no_other_forms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The prediction without it is no number, and says nothing of what it adds."""
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, effects = problem.stack, (EFFECTS["bulldozing"], EFFECTS["motor_heating"])
     free = free_of(effects)
     none = np.zeros(len(stack.rig.constants))
@@ -143,7 +150,7 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
     """What a pulley that slips does to all channels is a combination of the columns of a shear
     effect, but not of those of bulldozing.
     """
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
@@ -165,7 +172,7 @@ def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool)
     """An effect that is three tenths stronger and weaker along the bed, ten times on it, is within
     its freedom to vary along the place; a friction of the drive is not.
     """
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
@@ -202,7 +209,7 @@ def test_no_law_says_what_profile_a_hub_has() -> None:
     """Its third harmonic, as large as the first, is a combination of the columns with another of
     its profiles; what goes on evenly has no harmonics.
     """
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, free = problem.stack, free_of((EFFECTS["hub_runout"],))
     x = np.array([1.0 if f.parameter.name == "lift_cos" else 0.0 for f in free])
     start = np.zeros(len(stack.rig.constants)), x
@@ -222,7 +229,7 @@ def test_no_law_says_what_profile_a_hub_has() -> None:
 
 
 def test_a_steady_effect_has_no_profile() -> None:
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     stack, free = problem.stack, free_of((EFFECTS["bulldozing"],))
     start = np.zeros(len(stack.rig.constants)), np.ones(len(free))
     fitted = problem.descend((EFFECTS["bulldozing"],), free, *start, rounds=0)
@@ -233,7 +240,7 @@ def test_a_steady_effect_has_no_profile() -> None:
 def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_new() -> None:
     effect = EFFECTS["bulldozing"]
     free = free_of((effect,))
-    plain = fit_base(_stack().rig).problem
+    plain = _problem()
     constants = np.zeros(len(plain.stack.rig.constants))
     as_new = plain.descend((effect,), free, constants, np.ones(len(free)), rounds=0)
 
@@ -253,7 +260,7 @@ def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_n
 
 
 def test_a_rig_without_a_reference_has_none_of_it() -> None:
-    problem = fit_base(_stack().rig).problem
+    problem = _problem()
     none = np.zeros(len(problem.stack.rig.constants))
     fitted = problem.descend((), (), none, np.zeros(0), rounds=0)
     assert had_freedoms(problem.stack, problem.noise, fitted) == ()

@@ -83,6 +83,7 @@ def test_one_load_is_said_not_to_separate():
     assert ticks[-1]["flags"] & Flag.NOT_SEPARABLE and ticks[-1]["separability"] > 0.5
 
 
+@pytest.mark.long
 def test_one_load_keeps_the_truth_inside_the_joint_ellipse():
     squares = normalised(RIG, ONE_LOAD[:5], 20)
     assert np.mean(squares < 5.99) >= 0.85

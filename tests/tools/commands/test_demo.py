@@ -37,6 +37,7 @@ def children(folder):
     return found
 
 
+@pytest.mark.long
 def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
     folder = tmp_path / "run"
     command = [*GRITD, "demo", "--seconds", "5", "--plant", "linear", "--output", str(folder)]

@@ -94,7 +94,7 @@ def test_a_replay_with_a_learnt_discrepancy_is_identical_too(tmp_path, capsys, c
     assert "identical bit for bit" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("seed", ["0", "1", "4242"])
+@pytest.mark.parametrize("seed", ["0", "4242"])
 def test_a_replay_does_not_depend_on_hash_order(recorded, seed):
     environment = {**os.environ, "PYTHONHASHSEED": seed}
     done = subprocess.run(
@@ -131,6 +131,7 @@ def test_any_number_of_jobs_says_the_same(several, capsys):
     assert all(name in said[0][1] for name in several)
 
 
+@pytest.mark.long
 def test_an_error_ends_several_jobs_where_it_ends_one(several, tmp_path, capsys):
     """The recordings before it have been told, those after it are not."""
     Path(several[1]).write_bytes(b"no recording")

@@ -12,6 +12,7 @@ def test_prints_the_papers_figures_beside_ours(capsys: pytest.CaptureFixture[str
     assert "nan" not in out and "inf " not in out
 
 
+@pytest.mark.long
 def test_the_same_seed_prints_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     texts = []
     for seed in ("3", "3", "4"):

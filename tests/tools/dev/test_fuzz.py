@@ -10,6 +10,7 @@ SHARE = {"configuration": 0.005, "CAN databases": 0.01, "recordings cut at every
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+@pytest.mark.long
 def test_a_share_of_every_target(target, tmp_path):
     assert (
         run(target, max(1, round(target.cases * SHARE.get(target.name, 0.002))), 2, tmp_path) == 0

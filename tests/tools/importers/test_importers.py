@@ -257,6 +257,7 @@ def test_a_file_larger_than_the_limits_is_refused(
     assert expected in complaint("table", files, "-o", tmp_path / "out")
 
 
+@pytest.mark.long
 def test_a_matlab_file_of_too_many_numbers_is_not_unpacked(tmp_path: Path) -> None:
     log = {"t": np.arange(5_000_000.0), "qm": 0.0, "gtau": 35.0, "vir": 0.0}
     savemat(tmp_path / "DATA_EMPS.mat", log, do_compression=True)

@@ -29,6 +29,7 @@ def begun() -> EffectSearch:
 
 
 @pytest.mark.parametrize("which", [0, 3])
+@pytest.mark.long
 def test_columns_are_judged_beside_a_discrepancy_of_each_size(which: int) -> None:
     """As beside a model that has it of this size alone."""
     search = begun()

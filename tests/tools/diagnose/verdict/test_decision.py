@@ -54,6 +54,7 @@ def test_another_published_form_keeps_its_name() -> None:
     assert other.evidence > other.marginal.log_evidence((0,)) + 3.0
 
 
+@pytest.mark.long
 def test_the_calibration_is_learnt_from_what_was_true() -> None:
     """Rivals whose evidence is three times too large: the temperature comes out as three."""
     rng, cases = np.random.default_rng(0), []

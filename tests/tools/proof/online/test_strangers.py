@@ -37,6 +37,7 @@ def test_a_bench_whose_physics_is_not_stated_is_not_believed_and_told_why(tmp_pa
     assert not found.believed and "diagnose" in found.reason
 
 
+@pytest.mark.long
 def test_a_step_of_the_soil_is_said_or_within_sigma(tmp_path):
     assert score(tmp_path, "step", 11).silent < 0.1
 
@@ -60,6 +61,7 @@ def test_more_noise_is_a_wider_bound():
     assert 1.2 < sigma_of_c(louder, tables) / sigma_of_c(bench, tables) < 2.1
 
 
+@pytest.mark.long
 def test_the_table_has_a_row_a_stratum_and_counts_what_is_believed(tmp_path):
     found = score(tmp_path, "few", 12)
     lines = list(batch.table([found]))

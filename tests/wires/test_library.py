@@ -29,14 +29,6 @@ def test_the_library_is_there_and_compact():
     assert {path.name for path in FOLDER.iterdir()} == {one.name for one in sessions()}
 
 
-def test_differences_are_told_in_words():
-    want = {"a": {"bad": 1}, "x": 2.0, "list": [1, 2.0], "gone": 3}
-    have = {"a": {"bad": 2, "new": 4}, "x": 2.0000001, "list": [1, 2.1]}
-    assert list(differences(want, have)) == [
-        "a bad: 2, was 1", "a new: 4, was 0", "gone: 0, was 3", "list[1]: 2.1, was 2.0",
-    ]  # fmt: skip
-
-
 def test_good_sessions_lose_nothing_and_bad_ones_say_so():
     """What the names promise stands in the outcomes."""
     told = {one.name: one.outcome for one in sessions()}

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from scipy.io import savemat
 
 from gritd.config import packaged
+from tests.tools.calibrate import bench
 from tests.wording.commands import simulated
 from tests.wording.rig import output, said
 
@@ -122,3 +124,42 @@ def wrong_diagnoses(folder: Path) -> Iterator[str]:
     address = "tcp://127.0.0.1:9999"
     yield from said(folder, "diagnose", "run-60.mcap", *given, "--scheduler", address)
     yield from said(folder, "diagnose", "run-60.mcap", *given, "--json", "run-60.mcap")
+
+
+@output
+def wrong_rigs(folder: Path) -> Iterator[str]:
+    """Files of known rigs that are not what they should be."""
+    log = folder / "f-d-large-box__force-displacement_1.ft.csv"
+    log.write_text("# zero offsets: 0.1,0.2,0.3,0.4,0.5,0.6\n# time,Fx,Fy,Fz,Tx,Ty,Tz\n")
+    log.with_name(log.name.replace(".ft.csv", ".rig.txt")).write_text("1,2,3,4,5,6,7\n")
+    yield from said(folder, "import", "cmu", ".", "-o", "out")
+    log.unlink()
+
+    values = {"t": np.arange(5.0), "qm": np.zeros(4), "gtau": 35.0, "vir": np.zeros(5)}
+    for rig, name in (("emps", "DATA_EMPS.mat"), ("cmu", "all_smooth_data.mat")):
+        (folder / name).write_bytes(b"no MATLAB file at all, and too short for one" * 10)
+        yield from said(folder, "import", rig, ".", "-o", "out")
+        savemat(folder / name, values)
+        yield from said(folder, "import", rig, ".", "-o", "out")
+
+
+@output
+def wrong_calibrations(folder: Path) -> Iterator[str]:
+    bench.rig(folder)
+    time, physical = bench.staircase([0.0, 0.01, 0.02])
+    volts = bench.noisy(physical / 0.025, 2e-3, 1)
+    run = bench.record(folder / "r.mcap", {"sinkage_pot": (time, volts)})
+    (folder / "p.txt").write_text("Force, depth\n1,2\n")
+    known = ("--known", "0, 1 mm")
+
+    for kind, *arguments in (
+        ("pot", "--known", "0, 10 mm"),
+        ("pot",),
+        ("pot", "--step", "x"),
+        ("pot", "--step", "90-95=3 mm"),
+        ("shunt", "--known", "0, 1 A"),
+        ("pot", *known, "--apply", "testbed.yaml"),
+    ):
+        given = ("--config", "testbed.yaml", "--from", run.name)
+        yield from said(folder, "calibrate", kind, *given, *arguments)
+    yield from said(folder, "calibrate", "soil", "p.txt", "--config", "testbed.yaml")

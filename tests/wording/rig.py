@@ -23,6 +23,7 @@ PASSING = (
         r"\1 VERSION",
     ),
     (re.compile(r"\bmachine [^,]+(, glibc [\d.]+)?"), "machine VERSION"),
+    (re.compile(r"Unknown mat file type[^;]*"), "REASON"),
     (re.compile(r"\btick_revision \w+"), "tick_revision VERSION"),
 )
 

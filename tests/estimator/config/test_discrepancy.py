@@ -99,18 +99,6 @@ def test_of_sinkage_and_pull_alone():
     assert config.loads(written(given), "rig.yaml").settings.discrepancy == given
 
 
-def test_of_no_channel_at_all():
-    line = message(re.sub(r"  (torque|sinkage|drawbar_pull): \{.*\n", "", TEXT))
-    assert "discrepancy.points" in line and "one at least of torque, drawbar_pull, sinkage" in line
-
-
-def test_channels_have_the_same_directions():
-    found = forms.form(3, directions=2)
-    more = forms.form(3, directions=3)
-    line = message(written(type(found)(**{**vars(found), "sinkage": more.sinkage})))
-    assert "discrepancy.sinkage.spread" in line and "2 directions, the same for all" in line
-
-
 def test_points_that_differ_by_nothing_still_have_a_root():
     """Rounding may put two of them on one place."""
     text = re.sub(r"points: \[(\[[^]]*\]), \[[^]]*\]", r"points: [\1, \1", TEXT)

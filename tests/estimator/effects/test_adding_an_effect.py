@@ -43,10 +43,6 @@ def cable_drag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[type
     sys.modules.pop("gritd.estimator.effects.cable_drag")
 
 
-def test_the_page_names_the_file() -> None:
-    assert "Save this as `estimator/effects/cable_drag.py`" in PAGE
-
-
 def test_the_folder_finds_it(cable_drag: type[Effect]) -> None:
     assert cable_drag.name == "cable_drag" and cable_drag.stage == "testbed"
 

@@ -46,9 +46,3 @@ def test_every_quantity_has_its_unit():
         assert "{" not in meaning, name
         if kind == "float64":
             assert "[" in meaning and "]" in meaning, name
-
-
-def test_the_two_updates_have_units_of_their_own():
-    meanings = {name: meaning for name, _, meaning in TICK_FIELDS}
-    assert meanings["torque_s"] == "innovation variance [N·m²]"
-    assert meanings["drawbar_pull_s"] == "innovation variance [N²]"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gritd.estimator.limits import VARIABLE, raised
+from gritd.estimator.limits import VARIABLE
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.recording import mcapfile
 from gritd.estimator.recording.backlog import Backlog, PartStart
@@ -80,11 +80,6 @@ def test_a_bare_record_of_any_size_is_read_or_said(
 def test_records_that_do_not_fill_their_block_are_damage(data: bytes) -> None:
     with pytest.raises(Damaged, match="ends inside a record"):
         list(records(data))
-
-
-def test_the_words_for_a_limit_that_counts_have_no_unit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(VARIABLE, raising=False)
-    assert raised("chunks") == f"{VARIABLE}='chunks=2e+06' raises the limit"
 
 
 # --- messages ---

@@ -69,24 +69,6 @@ def said(*arguments: object) -> str:
     return str(error.value)
 
 
-def test_what_the_user_is_told(tmp_path: Path) -> None:
-    file = rig(tmp_path)
-    time, physical = staircase([0.0, 0.01, 0.02])
-    run = record(tmp_path / "r.mcap", {"sinkage_pot": (time, noisy(physical / 0.025, 2e-3, 1))})
-    pot = ("pot", "--config", file, "--from", run)
-
-    assert "found 3 stretches at rest (" in said(*pot, "--known", "0, 10 mm")
-    assert "expected --known VALUES" in said(*pot)
-    assert "expected BEGIN-END=VALUE" in said(*pot, "--step", "x")
-    assert "fewer than ten readings" in said(*pot, "--step", "90-95=3 mm")
-    assert "no readings of motor_shunt" in said(
-        "shunt", "--config", file, "--from", run, "--known", "0, 1 A"
-    )
-    assert "is the configuration that is read" in said(*pot, "--known", "0, 1 mm", "--apply", file)
-    (tmp_path / "p.txt").write_text("Force, depth\n1,2\n")
-    assert "found no plate diameter" in said("soil", tmp_path / "p.txt", "--config", file)
-
-
 def test_steps_state_where_the_values_were(tmp_path: Path) -> None:
     file = rig(tmp_path)
     time, physical = staircase([0.0, 0.01, 0.02])

@@ -27,21 +27,6 @@ def test_the_report_names_machine_and_every_section(figures):
     assert max(map(len, lines)) < 180
 
 
-def test_what_takes_minutes_is_told_where_it_was_asked_for(figures):
-    more = {
-        "long_replay": {"seconds": 3600.0, "speed": 600.0, "reading": 1.5, "filter": 4.5},
-        "diagnosis": {
-            **{"2_runs_seconds": 5.0, "2_runs_memory": 4e8, "300_s_seconds": 9.0},
-            **{"300_s_memory": 8e8, "exponent_of_runs": 0.8, "exponent_of_length": 0.2},
-            "6_runs_on_2_cores_elapsed": 7.5,
-        },
-    }
-    said = bench.report({**figures, **more})
-    assert "3600 s with ticks: 600 times real time" in said
-    assert "2 runs: 5.0 s, 400 MB" in said and "runs^0.80, length^0.20" in said
-    assert "6 runs on 2 cores: 7.5 s by the wall clock" in said
-
-
 def test_json_is_one_object_with_the_machine(figures, monkeypatch, capsys):
     monkeypatch.setattr(bench, "measure", lambda sizes, folder: figures)
     assert bench.main(["--json"]) == 0

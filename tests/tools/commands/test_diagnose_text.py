@@ -8,8 +8,6 @@ import pytest
 
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.explain.wording import described
-from gritd.tools.diagnose.fit.shape import Shape
 from tests.tools.report import cases
 
 
@@ -30,10 +28,3 @@ def test_the_soil_is_told_with_its_unit_both_times() -> None:
     (line,) = (each for each in text(diagnosis).splitlines() if each.startswith("  c: "))
     assert line.count(" Pa ") == 2
     assert line.startswith(f"  c: {soil.before['c'].value:.0f} ± ")
-
-
-def test_a_misfit_without_a_name_is_told_in_words() -> None:
-    assert described(Shape("torque", ("position",), "step")) == "a step in torque along the bed"
-    assert described(Shape("axle_torque", ("time",), "wave")) == "a wave in axle torque over time"
-    smooth = described(Shape("torque", ("slip", "load")))
-    assert smooth == "a smooth change in torque with slip and with load"

@@ -42,10 +42,3 @@ def test_what_looks_alike_is_told_of_both():
 def test_a_mistyped_effect_has_a_suggestion(command, capsys):
     assert cli.main(command) == 2
     assert "(did you mean coulomb_friction?)" in capsys.readouterr().err
-
-
-def test_a_mistyped_command_has_a_suggestion(capsys):
-    with pytest.raises(SystemExit) as ended:
-        cli.main(["diagnos"])
-    said = capsys.readouterr().err
-    assert ended.value.code == 2 and "did you mean diagnose?" in said and said.count("\n") == 1

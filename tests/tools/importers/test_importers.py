@@ -284,25 +284,6 @@ def test_a_log_without_numbers_is_refused(tmp_path: Path) -> None:
         assert said.startswith(str(log)) and expected in said
 
 
-def test_a_penetration_test_without_rows_is_refused(tmp_path: Path) -> None:
-    log = tmp_path / "f-d-large-box__force-displacement_1.ft.csv"
-    log.write_text("# zero offsets: 0.1,0.2,0.3,0.4,0.5,0.6\n# time,Fx,Fy,Fz,Tx,Ty,Tz\n")
-    log.with_name("f-d-large-box__force-displacement_1.rig.txt").write_text(
-        "1,2,3,4,5,6,7\n1,2,3,4,5,6,8\n"
-    )
-    assert f"{log}: found no rows" in complaint("cmu", tmp_path, "-o", tmp_path / "out")
-
-
-def test_a_matlab_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "DATA_EMPS.mat").write_bytes(b"no MATLAB file at all, and too short for one" * 10)
-    assert "DATA_EMPS.mat: cannot be read" in complaint("emps", tmp_path, "-o", tmp_path / "out")
-    savemat(
-        tmp_path / "DATA_EMPS.mat",
-        {"t": np.arange(5.0), "qm": np.zeros(4), "gtau": 35.0, "vir": np.zeros(5)},
-    )
-    assert "qm: found 4 values; expected 5" in complaint("emps", tmp_path, "-o", tmp_path / "out")
-
-
 @pytest.mark.parametrize("taken", ["out", "out/mgst-20-165209.mcap"])
 def test_an_output_that_cannot_be_made_is_usage(tmp_path: Path, taken: str) -> None:
     if taken == "out":
@@ -381,10 +362,3 @@ def test_the_trials_of_a_matlab_file_are_those_of_the_table(tmp_path: Path) -> N
             f.name: salvage.read(f).arrays("/raw/wrench")["fx"].tolist() for f in files
         }
     assert len(written["mat"]) == 4 and written["mat"] == written["csv"]
-
-
-def test_a_matlab_file_of_something_else_is_one_line(tmp_path: Path) -> None:
-    savemat(tmp_path / "all_smooth_data.mat", {"x": np.arange(5.0)})
-    assert "found no trials" in complaint("cmu", tmp_path, "-o", tmp_path / "out")
-    (tmp_path / "all_smooth_data.mat").write_text("text")
-    assert "cannot be read" in complaint("cmu", tmp_path, "-o", tmp_path / "out")

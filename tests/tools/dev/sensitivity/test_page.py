@@ -47,16 +47,6 @@ def test_the_table_names_the_campaigns_whose_verdict_changes(tmp_path: Path) -> 
     assert "how many there were): `screen.kinds` (2)." in text
 
 
-def test_a_table_that_is_not_finished_says_so(tmp_path: Path) -> None:
-    runs = finished(tmp_path)
-    assert "This table is complete." in page(runs)
-    runs.moved = {case: moved for case, moved in runs.moved.items() if case.field == LEVEL}
-    text = page(runs, campaigns=["a", "b"])
-    assert "partial: 2 of 6 diagnoses" in text
-    assert "Not begun: `b`." in text
-    assert "Not run yet: `screen.kinds`, `verdict.odds`." in text
-
-
 def test_what_a_person_wrote_stays(tmp_path: Path) -> None:
     runs = finished(tmp_path)
     written = page(runs).replace("## The table", "## What it shows\n\nMuch.\n\n## The table")

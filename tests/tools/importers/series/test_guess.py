@@ -166,81 +166,7 @@ def guess_of(folder: Path, columns: dict[str, list[float] | list[str]]) -> str:
     return guessed([csv_text.read(folder / "run.csv")])
 
 
-RISING = [0.02 * x for x in range(50)]
 NOISE = [3.0 + 0.1 * (x * 7 % 5) for x in range(50)]
-
-
-def test_a_column_that_rises_evenly_is_time(tmp_path: Path) -> None:
-    text = guess_of(tmp_path, {"qx": RISING, "wheel": NOISE})
-    assert re.search(r"^  qx: \{channel: time, unit: s\}", text, re.M)
-
-
-def test_the_number_of_a_row_is_no_time_and_the_rate_is_asked(tmp_path: Path) -> None:
-    text = guess_of(tmp_path, {"qx": list(range(50)), "wheel": NOISE})
-    assert "channel: time" not in text and re.search(r"^# \? rate:", text, re.M)
-
-
-def test_a_unit_of_time_that_nothing_tells_is_asked(tmp_path: Path) -> None:
-    text = guess_of(tmp_path, {"t": list(range(50)), "wheel": NOISE})
-    assert not re.search(r"^  t:", text, re.M)
-    assert {"s", "ms"} <= set(re.findall(r"^  # t: \{channel: time, unit: (\w+)\}", text, re.M))
-    assert "unit: ms}" in guess_of(tmp_path, {"t": [20.0 * x for x in range(50)], "wheel": NOISE})
-
-
-@pytest.mark.parametrize(
-    ("first", "unit"),
-    [(1.795e9, "s"), (1.795e12, "ms")],
-)
-def test_a_time_since_1970_tells_its_unit(tmp_path: Path, first: float, unit: str) -> None:
-    step = 0.02 * first / 1.795e9
-    text = guess_of(tmp_path, {"stamp": [f"{first + step * x:.6f}" for x in range(50)], "v": NOISE})
-    assert f"channel: time, unit: {unit}}}" in text
-
-
-def test_dates_that_can_be_read_are_proposed_and_others_are_not(tmp_path: Path) -> None:
-    good = [f"2026/11/26/14:03:{x / 50 + 5:09.6f}" for x in range(50)]
-    assert "time: {channel: time, unit: clock}" in guess_of(tmp_path, {"time": good, "v": NOISE})
-
-    open_order = [f"03/04/2026 14:03:{x / 50 + 5:09.6f}" for x in range(50)]
-    text = guess_of(tmp_path, {"time": open_order, "v": NOISE})
-    assert "# ? time" in text and "day-month-year" in text and "month-day-year" in text
-
-    strange = [f"kw 47 tag {x}" for x in range(50)]
-    assert "channel: time" not in guess_of(tmp_path, {"time": strange, "v": NOISE})
-
-
-def test_a_constant_speed_is_a_speed_and_a_constant_load_the_weights(tmp_path: Path) -> None:
-    constant = [[12.0] * 50, [60.0] * 50]
-    text = guess_of(
-        tmp_path,
-        {"t": RISING, "wheel rpm": constant[0], "cart mm/s": constant[1], "load [N]": constant[1]},
-    )
-    assert "'wheel rpm': {channel: wheel_speed, unit: rpm}" in text
-    assert "'cart mm/s': {channel: carriage_speed, unit: mm/s}" in text
-    assert "'load [N]': {channel: nominal_load, unit: N}" in text
-
-
-@pytest.mark.parametrize("name", ["Fz [N]", "sinkage [mm]", "motor current [A]"])
-def test_a_sign_is_asked_and_not_turned(tmp_path: Path, name: str) -> None:
-    text = guess_of(tmp_path, {"t": RISING, name: [-x for x in NOISE]})
-    line = next(line for line in text.splitlines() if name in line and "channel" in line)
-    active, _, comment = line.partition(" # ")
-    assert comment.startswith("?") and "factor: -1" in comment and "factor" not in active
-
-
-def test_other_units_get_their_factor(tmp_path: Path) -> None:
-    text = guess_of(tmp_path, {"t": RISING, "load [kg]": NOISE, "x [in]": NOISE})
-    assert "'load [kg]': {channel: load, unit: N, factor: 9.80665}" in text
-    assert "'x [in]': {channel: carriage_position, unit: mm, factor: 25.4}" in text
-
-
-def test_a_column_that_another_file_lacks_is_not_proposed(tmp_path: Path) -> None:
-    first = written(tmp_path, ["Zeit [s]", "Zugkraft [N]"])
-    table = csv_text.read(first)
-    (tmp_path / "b").mkdir()
-    other = csv_text.read(written(tmp_path / "b", ["Zeit [s]", "Einsinkung [mm]"]))
-    text = guessed([table, other])
-    assert "'Zeit [s]': {channel: time" in text and "channel: drawbar_pull" not in text
 
 
 def test_days_of_a_spreadsheet_are_dates(tmp_path: Path) -> None:
@@ -283,14 +209,6 @@ def test_a_topic_that_every_bag_has_is_in_each(tmp_path: Path) -> None:
     assert "not in" not in guessed(tables)
 
 
-def test_answers_name_the_line_that_they_replace(tmp_path: Path) -> None:
-    """A torque whose side is asked, beside one whose side is known."""
-    names = ["time_s", "wheel rpm", "cart mm/s", "axle torque [Nm]", "torque [lbf-in]"]
-    text, _, asked = proposed(written(tmp_path, names))
-    line = next(line for line in text.splitlines() if "channel: torque" in line and "lbf" in line)
-    assert names[-1] in asked and "in the place of 'axle torque [Nm]'" in line
-
-
 def test_a_text_of_a_folder_that_is_no_table_is_left_out_and_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -307,26 +225,3 @@ def test_a_text_of_a_folder_that_is_no_table_is_left_out_and_named(
     command = ["series", str(folder), "--map", str(tmp_path / "map.yaml"), "-o", str(out)]
     assert main(command) == 0 and (out / f"{path.stem}.mcap").exists()
     assert "LIESMICH.txt is no table" in capsys.readouterr().out
-
-
-def test_what_wraps_and_a_height_are_seen(tmp_path: Path) -> None:
-    turning = [(3.0 * at) % 360.0 for at in range(500)]
-    counts = [float(97 * at % 4096) for at in range(500)]
-    columns = {"t [s]": [at / 50 for at in range(500)], "wheel [deg]": turning}
-    columns |= {"cart counts": counts, "laser [mm]": NOISE * 10}
-    text = guess_of(tmp_path, columns)
-    assert "'wheel [deg]': {channel: wheel_angle, unit: deg, wraps: 360 deg}" in text
-    assert "carriage_count, unit: count, wraps: 4096 count}" in text
-    line = next(line for line in text.splitlines() if "laser" in line)
-    assert "channel: sinkage" in line and "# ?" in line
-
-
-def test_topics_say_whose_a_field_is_and_long_arrays_take_one_line(tmp_path: Path) -> None:
-    rows, rng = 200, np.random.default_rng(1)
-    read_from = {"/drive/state.velocity": rng.normal(0.3, 0.01, rows)}
-    read_from |= {"/odom.x": np.arange(rows) * 1e-3, "/odom.orientation.w": np.ones(rows)}
-    read_from |= {f"/odom.covariance[{at}]": np.zeros(rows) for at in range(36)}
-    np.savez(tmp_path / "run.npz", **read_from)
-    text = guessed(read(tmp_path / "run.npz"))
-    assert "'/drive/state.velocity': {channel: wheel_speed" in text
-    assert "nominal_load" not in text and text.count("covariance") == 1

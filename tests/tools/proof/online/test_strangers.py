@@ -9,7 +9,6 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from gritd.tools.proof.online import batch
 from gritd.tools.proof.online.draw import CHANGES, LEFT_OUT, STRATA, drawn
 from gritd.tools.proof.online.drive import driven, share
 from gritd.tools.proof.online.exact import sigma_of_c
@@ -59,10 +58,3 @@ def test_more_noise_is_a_wider_bound():
     noise = bench.noise._replace(force=2.0 * bench.noise.force, torque=2.0 * bench.noise.torque)
     louder = type(bench)(**{**vars(bench), "noise": noise})
     assert 1.2 < sigma_of_c(louder, tables) / sigma_of_c(bench, tables) < 2.1
-
-
-@pytest.mark.long
-def test_the_table_has_a_row_a_stratum_and_counts_what_is_believed(tmp_path):
-    found = score(tmp_path, "few", 12)
-    lines = list(batch.table([found]))
-    assert sum(line.startswith("| `few` | 1 |") for line in lines) == 1

@@ -80,7 +80,7 @@ proof: $(READY) ## the proofs on real recordings in ../shared/real; writes docs/
 scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
 	@$(BIN)/python -m gritd.tools.dev.reliability --jobs $(JOBS)
 
-coverage: $(READY) ## which branches of estimator and drivers the tests take; writes that part of docs/reliability.md
+coverage: $(READY) ## which branches of estimator, drivers and tools the tests take; writes that part of docs/reliability.md
 	@$(BIN)/python -m gritd.tools.dev.coverage --jobs $(JOBS)
 
 fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody meant: the full counts

@@ -14,7 +14,8 @@ def report(tmp_path, taken):
         "summary": {"covered_branches": taken, "num_branches": 20},
         "missing_branches": [[7, 9], [12, -3]][: 20 - taken],
     }
-    files = {"estimator/a.py": whole, "drivers/b.py": whole, "drivers/c.py": part}
+    files = {"tools/cli/d.py": part, "tools/main.py": whole}
+    files |= {"estimator/a.py": whole, "drivers/b.py": whole, "drivers/c.py": part}
     path = tmp_path / "report.json"
     path.write_text(json.dumps({"files": files}))
     return path
@@ -32,6 +33,7 @@ def test_the_page_tells_each_package_and_what_no_test_takes(tmp_path, monkeypatc
     assert "| `estimator` | 40 | 40 | 100.0 % |" in text
     assert "| `drivers` | 60 | 58 | 96.7 % |" in text
     assert "| `drivers/c.py` | 20 | 18 | 7 → 9, 12 → end |" in text and "b.py" not in text
+    assert "| `tools/cli` | 20 | 18 | 90.0 % |" in text and "d.py" not in text
 
     assert coverage.main(["--from", str(report(tmp_path, 0))]) == 1
     assert "drivers: 66.7 %, limit 95 %" in capsys.readouterr().err

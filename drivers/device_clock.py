@@ -2,23 +2,45 @@
 as speed, and a wrong stamp costs one sample.
 
 Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms,
-schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or one
-whose time goes back, has a wrong time: it gets no stamp, and the line does not see it. Where
-frames agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's clock
-has stepped.
+schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or a
+late one whose time goes back, has a wrong time and gets no stamp. The frames of the last moment
+vote: where most of them agree on another line, and delay does not explain it, the device's clock
+has stepped. As in NTP an outlier is suppressed, and a step is believed when it has lasted:
+D. Mills, RFC 5905, sections 10 and 11.3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import median
+from statistics import median_low
+from typing import NamedTuple
 
-from gritd.drivers.clock_line import STRAY, ClockLine
-from gritd.drivers.clock_step import FLAT, Doubt, Rival
+from gritd.drivers.clock_line import ClockLine
 
 LATE = 20e6  # [ns] longer than a USB adapter holds a frame back
-SILENCE = 10e9  # [ns] after which the drift is not trusted
-MARGIN = 10e6  # [ns] for the drift
+EARLY = 10e6  # [ns] what comes earlier than this over the line has a wrong time
+WINDOW = 0.15e9  # [ns] in which frames vote; they have to agree for
+MOST = 2 / 3  # of it, and so many of them, for some may be wrong
+PAUSE = 40_000_000  # [ns] between two frames: more does not count in the window
+USELESS = 0.5e9  # [ns] without any frame that could be right: the clock has another rate
+SILENCE = 5.5e9  # [ns] without one on the line: longer than a computer is expected to stand still
+
+
+class Vote(NamedTuple):
+    """The last frame of a chunk, which waited least [ns].
+
+    age: since the first vote, without pauses. is_possible: its time could be right, and no frame of
+    the chunk is older than the two before it.
+    """
+
+    time: int
+    offset: int  # receive time − device time
+    age: int
+    is_possible: bool = True
+
+    @property
+    def received(self) -> int:
+        return self.time + self.offset
 
 
 class DeviceClock:
@@ -35,14 +57,12 @@ class DeviceClock:
         self.restarts = 0  # times it began at zero: the device was switched on
         self._modulus = modulus_us * 1000
         self._line = ClockLine()
-        self._seen: list[int] = []  # the two latest device times, late or not
-        self._start(0, 0)
+        self._begin(0, 0)
         self.restart()
 
     def restart(self) -> None:
         """Forget the mapping: the device was reopened. The drift of its crystal is kept."""
-        self._started = False
-        self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
+        self._is_started = False
 
     def stamps(self, device_us: Sequence[int], received: int) -> list[int | None]:
         """When the samples of one chunk were taken [ns, our clock], None where the device's time
@@ -50,182 +70,207 @@ class DeviceClock:
 
         The whole chunk is looked at before any of it is stamped: its last frame waited least.
         """
-        if self._started and received - self._newest_received > SILENCE:
-            self._line.unsettle()
+        if not device_us:
+            return []
+        if not self._is_started:
+            self._begin(device_us[-1] * 1000, received)
+        elif received - self._on_line > SILENCE:
+            self._unsettle(received)
 
-        times = [self._unwrap(us * 1000, received) for us in device_us]
-        right = self._judged(times, received) if times else []
+        times = [self._unwrapped(us * 1000, received) for us in device_us]
+        right = self._judged(times, received)
         kept = [time for time, is_right in zip(times, right, strict=True) if is_right]
         self.rejected += len(times) - len(kept)
+        if not kept:
+            return [None] * len(times)
 
-        if kept:
-            self._follow(max(kept), received)
-            self._seen = sorted([*self._seen, *kept])[-2:]
-
-        end = self._squeezed(kept, received)
+        self._follow(max(kept), received)
+        stamps = self._stamped(kept, received)
         return [
-            self._stamp(time, received, end) if is_right else None
-            for time, is_right in zip(times, right, strict=True)
+            stamps[time] if is_right else None for time, is_right in zip(times, right, strict=True)
         ]
+
+    # --- the mapping
+    # --------------------------------------------------------------------
+
+    def _begin(self, time: int, received: int) -> None:
+        """Begin the mapping at this frame."""
+        self._is_started = True
+        self._heard = received  # when a frame last came that could be right
+        self._newest = self._second = time  # the two latest that were on the line
+        self._before: list[int] = []  # the last two
+        self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
+        self._line.begin([(time, received - time)])
+        self._unsettle(received)
+
+    def _unsettle(self, received: int) -> None:
+        """The line follows the lowest delays at once, until it has been confirmed."""
+        self._is_settled = False
+        self._votes: list[Vote] = []
+        self._on_line = self._doubted = received  # when a frame last was, and the first since not
+        self._seen = self._off = 0  # chunks since then, and those off the line
+
+    def _begin_again(self, time: int, received: int) -> None:
+        """Forget the mapping and begin it at a frame of the same device. It was switched on where
+        its clock went back and shows no more than the time since it was heard.
+        """
+        shown, silent = time % self._modulus, received - self._heard
+        self.restarts += shown < self._newest % self._modulus and shown <= silent + EARLY
+        self._begin(time, received)
+        self._vote(time, received, True)
+
+    def _unwrapped(self, wrapped: int, received: int) -> int:
+        """Device time without wraps [ns]: the turn of the clock nearest to where our own clock
+        expects it.
+        """
+        expected = received - self._line.at(self._newest)
+        half = self._modulus // 2
+        return expected + (wrapped - expected + half) % self._modulus - half
+
+    def _delay(self, time: int, received: int) -> int:
+        """How long a frame was on its way, over the line [ns]."""
+        return received - time - self._line.at(time)
 
     # --- which times are right
     # --------------------------------------------------------------------
 
-    def _unwrap(self, wrapped: int, received: int) -> int:
-        """Device time without wraps [ns]: the turn of the clock nearest to where our own clock
-        expects it.
-        """
-        if not self._started:
-            self._start(wrapped, received)
-        expected = self._newest + received - self._newest_received
-        half = self._modulus // 2
-        return expected + (wrapped - expected + half) % self._modulus - half
-
-    def _start(self, time: int, received: int) -> None:
-        """Begin the mapping at this frame."""
-        self._started = True
-        self._origin = received - time
-        self._first = time
-        self._newest = self._second = time  # the two latest that came without much delay
-        self._newest_received = received
-        self._seen = [time, time]
-        self._line = ClockLine(self._line.slope)
-        self._doubt = Doubt()
-
     def _judged(self, times: list[int], received: int) -> list[bool]:
         """Whether the time of each frame of a chunk can be right."""
-        if not self._line.settled:
-            if self._went_back(times, LATE):
+        delays = [self._delay(time, received) for time in times]
+        right = self._possible(times, delays)
+        self._vote(times[-1], received, right[-1] and not self._went_back(times))
+
+        if not self._is_settled:
+            if min(times) < self._second - LATE:
                 self._begin_again(times[-1], received)
             return [True] * len(times)
-
-        delays = [self._delay(time, received) for time in times]
-        possible = self._possible(times, delays)
-        if -STRAY <= min(delays) <= LATE:
-            self._doubt = self._doubt.calmed(received)
-            return possible
-        return self._doubted(times, received, delays, possible)
-
-    def _doubted(
-        self, times: list[int], received: int, delays: list[float], possible: list[bool]
-    ) -> list[bool]:
-        """The same of a chunk that is not on the line: others may agree with it on another one."""
-        impossible = [delay for delay, ok in zip(delays, possible, strict=True) if not ok]
-        rival = Rival(max(times), received, min(delays))
-        went_back = self._went_back(times) or min(times) < self._newest - STRAY
-        self._doubt.add(rival, impossible, went_back)
-        if agreed := self._doubt.agreed():
-            self._step(agreed, received)
+        if -EARLY <= delays[-1] <= LATE:
+            self._on_line, self._off = received, 0
+            return right
+        if self._has_stepped():
             return self._judged(times, received)
 
+        self._doubted = self._doubted if self._off else received
+        self._off += 1
         right = [
-            ok and not (delay > LATE and self._doubt.suspects(delay))
-            for ok, delay in zip(possible, delays, strict=True)
+            is_right and not (delay > LATE and self._is_suspect(received - time))
+            for is_right, delay, time in zip(right, delays, times, strict=True)
         ]
-        if self._doubt.is_hopeless(any(right)):
+        if received - max(self._heard, self._doubted) >= USELESS and not any(right):
             self._begin_again(times[-1], received)
             return [True] * len(times)
         return right
 
-    def _possible(self, times: list[int], delays: list[float]) -> list[bool]:
+    def _possible(self, times: list[int], delays: list[int]) -> list[bool]:
         """False for a frame from before the line, and for a late one whose time goes back."""
         possible, newest, second = [], self._newest, self._second
         for time, delay in zip(times, delays, strict=True):
-            possible.append(delay >= -STRAY and not (delay > LATE and time < second))
-            if -STRAY <= delay <= LATE:
+            possible.append(delay >= -EARLY and not (delay > LATE and time < second))
+            if -EARLY <= delay <= LATE:
                 newest, second = max(newest, time), max(second, min(newest, time))
         return possible
 
-    def _went_back(self, times: list[int], by: float = 0.0) -> bool:
-        """Whether a frame is older than two of those before it, be they late or not, by so much."""
-        seen = self._seen
-        for time in times:
-            if time < seen[0] - by:
-                return True
-            seen = sorted([*seen, time])[-2:]
-        return False
+    def _went_back(self, times: list[int]) -> bool:
+        """Whether one is older than the two before it."""
+        all_of = [*self._before, *times]
+        self._before = all_of[-2:]
+        return any(c < min(a, b) for a, b, c in zip(all_of, all_of[1:], all_of[2:], strict=False))
 
-    def _step(self, agreed: list[Rival], now: int) -> None:
-        """The device's clock has jumped: go on from the frames that say so, but for a wrong one.
-        The present chunk is followed later.
+    def _vote(self, time: int, received: int, is_possible: bool) -> None:
+        """Take up a frame as a vote, and drop the old ones."""
+        before = self._votes[-1] if self._votes else Vote(time, received - time, 0)
+        age = before.age + min(received - before.received, PAUSE)
+        self._votes.append(Vote(time, received - time, age, is_possible))
+        while age - self._votes[0].age > WINDOW:
+            del self._votes[0]
+
+    def _agreed(self) -> list[Vote]:
+        """The votes for one line: most of them, for a while; none as long as there is no such."""
+        middle = median_low(vote.offset for vote in self._votes)
+        agreed = [vote for vote in self._votes if abs(vote.offset - middle) <= LATE]
+        has_lasted = agreed[-1].age - agreed[0].age >= MOST * WINDOW
+        return agreed if has_lasted and len(agreed) >= MOST * len(self._votes) else []
+
+    def _has_stepped(self) -> bool:
+        """Whether the device's clock has jumped: go on from the frames that say so. Late ones may
+        have been held up by a computer that is too slow, unless the clock went back.
         """
-        least = median(rival.delay for rival in agreed) - FLAT
-        rivals = [rival for rival in agreed if rival.delay >= least]
+        agreed = self._agreed()
+        off = median_low(self._delay(vote.time, vote.received) for vote in agreed or self._votes)
+        is_explained = off > LATE and all(vote.is_possible for vote in self._votes)
+        if not agreed or -EARLY <= off <= LATE or is_explained:
+            return False
 
+        first = agreed[0]
+        before = self._line.at(first.time)
+        self._begin_again(first.time, first.received)
+        self._line.begin([(vote.time, vote.offset) for vote in agreed])
+        self._is_settled = True
         self.steps += 1
-        self.step = -min(rival.delay for rival in rivals) * 1e-9
-        self._begin_again(rivals[0].time, rivals[0].received)
+        self.step = (before - self._line.at(first.time)) * 1e-9
+        return True
 
-        for rival in rivals:
-            if rival.received < now:
-                self._follow(rival.time, rival.received)
-
-    def _begin_again(self, time: int, received: int) -> None:
-        """Forget the mapping and begin it at a frame of the same device."""
-        self.restarts += self._has_restarted(time % self._modulus, received)
-        self._last = None
-        self._start(time, received)
-
-    def _has_restarted(self, shown: int, received: int) -> bool:
-        """Whether the device's clock went back and shows no more than the time since it was
-        heard.
-        """
-        silent = received - self._newest_received
-        return shown < self._newest % self._modulus and shown <= silent + MARGIN
+    def _is_suspect(self, offset: int) -> bool:
+        """Whether a late frame belongs to others that nothing but a step explains."""
+        suspects = [vote for vote in self._votes[-self._off :] if not vote.is_possible]
+        return sum(abs(offset - vote.offset) <= LATE for vote in suspects) > 1
 
     # --- stamps
     # -----------------------------------------------------------------------------------
 
     def _follow(self, time: int, received: int) -> None:
         """Let the line see the frame of a chunk that waited least, unless it was held up."""
-        if self._line.settled and self._delay(time, received) > LATE:
+        self._heard = received
+        if not self._is_settled:
+            self._settle(time, received)
+        elif self._delay(time, received) > LATE:
             return
-        self._line.add((float(time - self._first), self._offset(time, received)))
-
-        if self._delay(self._newest, self._newest_received) < -STRAY:
-            # a wrong time, taken before the line was known: nothing is measured from it
-            self._newest = self._second = time
-            self._newest_received = received
+        else:
+            self._line.add((time, received - time))
 
         self._second = max(self._second, min(self._newest, time))
-        if time > self._newest:
-            self._newest, self._newest_received = time, received
+        self._newest = max(self._newest, time)
 
-    def _offset(self, time: int, received: int) -> float:
-        return float(received - time - self._origin)
-
-    def _delay(self, time: int, received: int) -> float:
-        """How long a frame was on its way, over the line [ns]."""
-        return self._offset(time, received) - self._line.at(float(time - self._first))
-
-    def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
-        """Device time and stamp of the chunk's newest sample where the line does not fit between
-        the last stamp and the receive time: it was pushed down since, or has yet to be.
+    def _settle(self, time: int, received: int) -> None:
+        """Follow the least delay, but for a single one far from the others, for a while. Where most
+        frames have not been on the line then, begin again.
         """
-        last = self._last
-        fresh = sorted(time for time in times if last is not None and time > last[0])
-        if last is None or not fresh:
-            return None
-        second = fresh[-2] if len(fresh) > 1 else fresh[0]  # the newest may be wrong
-        fits = self._mapped(fresh[0]) > last[1] and self._mapped(second) <= received
-        return None if fits else (fresh[-1], min(self._mapped(fresh[-1]), received))
+        points = sorted((vote.offset, vote.time) for vote in self._votes)
+        if len(points) > 1 and points[1][0] - points[0][0] > EARLY:
+            del points[0]
 
-    def _mapped(self, time: int) -> int:
-        return time + self._origin + round(self._line.at(float(time - self._first)))
+        below = -self._delay(points[0][1], sum(points[0]))
+        if below > 0:
+            self._line.begin([(at, offset) for offset, at in points])
+        if below > EARLY:
+            self._on_line, self._seen, self._off = received, 0, 0
 
-    def _stamp(self, time: int, received: int, end: tuple[int, int] | None) -> int:
-        stamp = min(self._mapped(time), received)
-        if self._last is None or time > self._last[0]:
-            if self._last is not None and end is not None:
-                stamp = min(max(_between(self._last, end, time), self._last[1] + 1), received)
-            self._last = (time, stamp)
-        elif time == self._last[0]:
-            stamp = self._last[1]
-        return stamp
+        self._seen += 1
+        self._off += self._delay(time, received) > LATE
+        if received - self._on_line < WINDOW:
+            return
+        if self._off > MOST * self._seen:
+            self._begin(time, received)
+        else:
+            self._is_settled, self._off = True, 0
 
+    def _stamped(self, times: list[int], received: int) -> dict[int, int]:
+        """The stamp of each time of a chunk: by the line for the newest, evenly between that and
+        the last stamp for those before, for the line may have moved: no sample may look like a
+        jump.
+        """
+        stamps = {time: min(time + self._line.at(time), received) for time in times}
+        newest, last = max(times), self._last
+        if last is None:
+            self._last = newest, stamps[newest]
+            return stamps
+        if newest <= last[0]:
+            return stamps | {last[0]: last[1]}
 
-def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
-    """A stamp between the last one and that of the chunk's newest sample, evenly: no sample may
-    look like a jump.
-    """
-    return last[1] + (end[1] - last[1]) * (time - last[0]) // (end[0] - last[0])
+        end = min(max(stamps[newest], last[1] + len(times)), received)
+        self._last = newest, end
+        return stamps | {
+            time: last[1] + (end - last[1]) * (time - last[0]) // (newest - last[0])
+            for time in times
+            if time >= last[0]
+        }

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.drivers.clock_line import hull_slope
 from gritd.drivers.device_clock import DeviceClock
 from tests.drivers.rig import FUZZ
 
@@ -298,8 +297,3 @@ def test_any_device_time_gives_a_stamp_not_later_than_its_receipt(frames):
         received += step
         (stamp,) = clock.stamps([us], received)
         assert stamp is None or stamp <= received
-
-
-def test_hull_slope_ignores_what_lies_above():
-    points = [(float(x), 0.5 * x + (0.0 if x in (0, 9) else 3.0)) for x in range(10)]
-    assert hull_slope(points) == pytest.approx(0.5)

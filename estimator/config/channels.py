@@ -34,7 +34,7 @@ CHANNEL_DOCS = {
     "carriage_encoder": "counts of the carriage pulley; physical: angle of the pulley",
     "sinkage_pot": "volts of the potentiometer; physical: sinkage z",
     "motor_shunt": "volts of the current shunt's amplifier; physical: motor current",
-    "wrench": "force/torque sensor: fx drawbar pull, fz vertical load, ty torque about the axle",
+    "wrench": "force/torque sensor: fx drawbar pull, fy side force, fz load, ty torque at the axle",
     "motor_temperature": "degrees Celsius of the winding",
 }
 
@@ -171,6 +171,11 @@ WRENCH = {
     ),
     "torque": Key(
         Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"
+    ),
+    "side_force": Key(
+        Section(_calibration("", "N", "1.0"), _build_calibration),
+        "calibration of fy, positive to either side; without it the side force is recorded only",
+        ABSENT,
     ),
     "force_noise": Key(
         NumberWithUnit("N", above=LEAST_NOISE), "standard deviation of one force reading"

@@ -85,8 +85,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class Wrench:
-    """The optional force/torque sensor. fx is drawbar pull, fz vertical load, ty torque about the
-    axle.
+    """The optional force/torque sensor. fx is drawbar pull, fy side force, fz vertical load, ty
+    torque about the axle.
     """
 
     device: str
@@ -100,6 +100,7 @@ class Wrench:
     max_torque: float = 1e3  # [N·m]
     latency: float = 0.0
     stale_after: float = 0.04
+    side_force: Calibration | None = None  # [-], [N]
 
     @property
     def pulls(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,7 +55,8 @@ class SensorDrift(Effect):
 
     def _moved(self, sensed: Sensed, situation: Situation, sign: float) -> Sensed:
         crept = -sign * np.expm1(-np.asarray(situation.time) / self.duration)
-        return Sensed(
+        return replace(
+            sensed,
             sinkage=sensed.sinkage + self.sinkage * crept,
             current=sensed.current + self.current * crept,
             drawbar_pull=sensed.drawbar_pull + self.drawbar_pull * crept,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.situation import ContactLaw, Situation
 
 
@@ -15,14 +15,21 @@ class SideSlip(Effect):
     """The wheel is toed in or out, so it slides sideways too and less shear strength is left along
     its plane.
 
-    τ_x = τ(j) j_x/j,   j² = j_x² + j_y²,   j_y = r (v/rω)(θ₁ − θ) tan β,   j_x by Eq. (6)
+    (τ_x, τ_y) = τ(j) [(1 − m)(j_x, j_y)/j + m (s_x, s_y)/s],   j² = j_x² + j_y²
+    j_y = r (v/rω)(θ₁ − θ) tan β, j_x by Eq. (6);   s_x = 1 − (v/rω) cos θ,   s_y = (v/rω) tan β
+    side force = r b ∫ τ_y dθ
 
-    Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, Eq. (9); shear
-    stress along the resultant displacement.
+    The shear stress has the direction of the displacement j (m = 0), or of the sliding s (m = 1).
+    Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, Eq. (9); Wong
+    (2008), Theory of Ground Vehicles, 4th ed., ch. 1, for the sliding.
     """
 
     angle: float = strength(
         "angle between wheel and travel, β", "rad", typical=0.35, low=0.0, high=1.4
+    )
+
+    sliding: float = shape(
+        "share in which stress follows the sliding, m", "", mean=0.0, sigma=0.5, low=0.0, high=1.0
     )
 
     stage = "contact"
@@ -36,4 +43,5 @@ class SideSlip(Effect):
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
-        return replace(law, side_slip=law.side_slip + float(np.tan(self.angle)))
+        tangent = law.side_slip + float(np.tan(self.angle))
+        return replace(law, side_slip=tangent, by_sliding=self.sliding)

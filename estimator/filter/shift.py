@@ -218,6 +218,7 @@ def true_integrals(
             theta_2=-law.theta_2_ratio * theta_1,
             mobilisation=law.mobilisation,
             side_slip=law.side_slip,
+            by_sliding=law.by_sliding,
             order=ORDER,
         )
 

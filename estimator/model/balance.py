@@ -63,6 +63,7 @@ def rim_forces(
         theta_2=-law.theta_2_ratio * theta_1,
         mobilisation=law.mobilisation,
         side_slip=law.side_slip,
+        by_sliding=law.by_sliding,
         order=order,
     )
 
@@ -231,6 +232,7 @@ def _take(contact: Contact, index: slice | Index) -> Contact:
             _at(law.adhesion, index),
             _at(law.friction, index),
             _at(law.side_slip, index),
+            law.by_sliding,
             law.mobilisation,
         ),
         _at(contact.slip, index),

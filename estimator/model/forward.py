@@ -180,7 +180,12 @@ def _response(
     effects: Sequence[Effect],
 ) -> Response:
     sensed = Sensed(
-        reaction.sinkage, situation.current, reaction.drawbar_pull, reaction.load, reaction.torque
+        reaction.sinkage,
+        situation.current,
+        reaction.drawbar_pull,
+        reaction.load,
+        reaction.torque,
+        reaction.side_force,
     )
 
     n = solved.theta_1.shape
@@ -223,13 +228,18 @@ def loaded(
         carried=forces.load,
         torque=forces.torque * situation.direction,
         drawbar_pull=forces.drawbar_pull * situation.direction,
+        side_force=forces.side_force * situation.direction,
     )
 
 
 def react(situation: Situation, effects: Sequence[Effect]) -> Reaction:
     """What the axle and then the testbed's sensors feel."""
     reaction = Reaction(
-        situation.drawbar_pull, situation.carried, situation.torque, situation.sinkage
+        situation.drawbar_pull,
+        situation.carried,
+        situation.torque,
+        situation.sinkage,
+        situation.side_force,
     )
     reaction = reduce(lambda reaction, e: e.wheel(reaction, situation), effects, reaction)
     return reduce(lambda reaction, e: e.testbed(reaction, situation), effects, reaction)

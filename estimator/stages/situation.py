@@ -74,6 +74,7 @@ class Situation:
     carried: Scalar = 0.0  # vertical force of the soil W [N]
     torque: Scalar = 0.0  # at the axle [N·m]
     drawbar_pull: Scalar = 0.0  # DP [N]
+    side_force: Scalar = 0.0  # of the soil, across the wheel [N]
     # the drivetrain
     current: Scalar = 0.0  # [A]
     # on line: what an effect remembers, by its name
@@ -90,6 +91,7 @@ class ContactLaw:
     adhesion: Scalar = 1.0  # factor on c alone [-]
     friction: Scalar = 1.0  # factor on tan φ alone [-]
     side_slip: Scalar = 0.0  # tangent of the angle between wheel and travel [-]
+    by_sliding: float = 0.0  # share in which shear stress has the direction of the sliding
     mobilisation: Mobilisation = janosi  # share of the strength mobilised at j/k
 
 
@@ -101,6 +103,7 @@ class Reaction:
     load: Scalar  # [N]
     torque: Scalar  # [N·m]
     sinkage: Scalar  # [m]
+    side_force: Scalar = 0.0  # [N]
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class Sensed:
     drawbar_pull: Scalar  # [N]
     load: Scalar  # [N]
     torque: Scalar  # [N·m]
+    side_force: Scalar = 0.0  # [N]
 
 
 def situation_of(motion: Motion, wheel: Wheel) -> Situation:

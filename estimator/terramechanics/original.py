@@ -46,6 +46,7 @@ class ContactStresses(NamedTuple):
     weight: Array  # quadrature weight times dθ [rad]
     sigma: Array  # normal stress [Pa]
     tau: Array  # shear stress, positive where it drives the wheel forward [Pa]
+    across: Array  # shear stress across the wheel, against its sliding sideways [Pa]
 
 
 class OriginalForces(NamedTuple):
@@ -55,6 +56,7 @@ class OriginalForces(NamedTuple):
     load: Array  # W [N], Eq. (9)
     torque: Array  # T [N·m], Eq. (10)
     resistance: Array  # second term of (8), rb∫σ sin θ dθ [N]
+    side_force: Array  # rb∫τ_y dθ [N], 0 for a wheel that goes where it points
 
 
 def theta_m(wheel: Wheel, slip: Scalar, theta_1: Scalar) -> Scalar:
@@ -118,8 +120,8 @@ def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
 def lateral_displacement(wheel: Wheel, slip: Scalar, points: Arc, side_slip: Scalar) -> Array:
     """Displacement (2·order, n) of the soil across the wheel [m]: r (v/rω)(θ₁ − θ) tan β.
 
-    side_slip is tan β, β the angle between wheel and travel. Shear stress acts along the resultant
-    of both displacements: Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    side_slip is tan β, β the angle between wheel and travel: Ishigami et al. (2007), J. Field
+    Robotics 24, 233-250.
     """
     displacement: Array = wheel.radius * velocity_ratio(slip) * side_slip * points.turned
     return displacement
@@ -154,9 +156,14 @@ def contact(
     theta_2: Scalar = 0.0,
     mobilisation: Mobilisation = janosi,
     side_slip: Scalar = 0.0,
+    by_sliding: float = 0.0,
     order: int = ORDER,
 ) -> ContactStresses:
-    """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones."""
+    """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones.
+
+    Under a wheel that slides sideways the shear stress has the direction of the displacement j of
+    the soil; by_sliding: share in which it has that of the sliding of the rim instead.
+    """
     peak = _peak(wheel, slip, theta_1) if theta_m is None else theta_m
     shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
     s, ds = (values.reshape(-1, *(1 for _ in shape)) for values in _nodes(order))
@@ -167,13 +174,24 @@ def contact(
     sigma = np.concatenate((sigma, sigma))  # by Eq. (4) the rear zone's is the same at the same s
 
     displacement = shear_displacement(wheel, slip, points)
-    tau = shear_stress(soil, sigma, displacement, mobilisation)
-    if np.any(side_slip):
-        total = np.hypot(displacement, lateral_displacement(wheel, slip, points, side_slip))
-        along = displacement / np.maximum(total, UNMOVED)
-        tau = shear_stress(soil, sigma, total, mobilisation) * along
+    if not np.any(side_slip):
+        tau = shear_stress(soil, sigma, displacement, mobilisation)
+        return ContactStresses(points, weight, sigma, tau, np.zeros_like(tau))
 
-    return ContactStresses(points, weight, sigma, tau)
+    lateral = lateral_displacement(wheel, slip, points, side_slip)
+    tau = shear_stress(soil, sigma, np.hypot(displacement, lateral), mobilisation)
+    along, across = _direction(displacement, lateral)
+    if by_sliding:
+        ratio = velocity_ratio(slip)
+        s_x, s_y = _direction(1.0 - ratio * points.cosine, ratio * side_slip)
+        along, across = along + by_sliding * (s_x - along), across + by_sliding * (s_y - across)
+    return ContactStresses(points, weight, sigma, tau * along, tau * across)
+
+
+def _direction(x: Array, y: Array) -> tuple[Array, Array]:
+    """Cosine and sine of the angle of (x, y) to the wheel's plane."""
+    length = np.maximum(np.hypot(x, y), UNMOVED)
+    return x / length, y / length
 
 
 def integrate(wheel: Wheel, contact: ContactStresses) -> OriginalForces:
@@ -185,7 +203,9 @@ def integrate(wheel: Wheel, contact: ContactStresses) -> OriginalForces:
     drawbar_pull = _dot(tau, points.cosine) - resistance  # Eq. (8)
     load = _dot(tau, points.sine) + _dot(sigma, points.cosine)  # Eq. (9)
     torque = wheel.radius * np.sum(tau, axis=0)  # Eq. (10)
-    return OriginalForces(drawbar_pull, load, torque, resistance)
+    slides = np.any(contact.across)
+    side_force = np.sum(area * contact.across, axis=0) if slides else np.zeros_like(torque)
+    return OriginalForces(drawbar_pull, load, torque, resistance, side_force)
 
 
 def forces(
@@ -198,6 +218,7 @@ def forces(
     theta_2: Scalar = 0.0,
     mobilisation: Mobilisation = janosi,
     side_slip: Scalar = 0.0,
+    by_sliding: float = 0.0,
     order: int = ORDER,
 ) -> OriginalForces:
     """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the
@@ -212,6 +233,7 @@ def forces(
         theta_2=theta_2,
         mobilisation=mobilisation,
         side_slip=side_slip,
+        by_sliding=by_sliding,
         order=order,
     )
 

@@ -195,7 +195,8 @@ def _closed(solved: Carried) -> OriginalForces:
     by = linear.forces_under_load(
         solved.wheel, c, tan_phi, k, theta_1, slip, load, maths=linear.ARRAYS
     )
-    return OriginalForces(*(np.asarray(getattr(by, name)) for name in OriginalForces._fields))
+    forces = (by.drawbar_pull, by.load, by.torque, by.resistance, np.zeros_like(theta_1))
+    return OriginalForces(*map(np.asarray, forces))
 
 
 # --- the table of runs ---

@@ -247,7 +247,7 @@ def test_correction_undoes_the_sensor(name: str) -> None:
 def test_latency_is_undone_away_from_the_ends() -> None:
     effect = make("sensor_latency", {"sinkage": 0.3, "current": 0.2, "force": 0.4})
     time = np.arange(500) / 25.0
-    true = Sensed(*(np.sin(time / k) for k in (2.0, 3.0, 4.0, 5.0, 6.0)))
+    true = Sensed(*(np.sin(time / k) for k in (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)))
     situation = replace(situation_of(campaign(1)[0], WHEEL), time=time)
     back = corrected(effect.sensors(true, situation), situation, (effect,))
     for f in fields(true):

@@ -42,7 +42,8 @@ def test_side_slip_turns_the_shear_stress(slip: float) -> None:
     theta_1, tangent, k = 0.8, 0.5, SOIL.shear_modulus
     theta_m = 0.5 * theta_1
 
-    def torque(theta: float) -> float:
+    def stresses(theta: float) -> tuple[float, float]:
+        """Shear stress along the wheel and across it."""
         front = theta if theta >= theta_m else theta_1 - theta
         depth = WHEEL.radius * max(np.cos(front) - np.cos(theta_1), 0.0)
         sigma = SOIL.modulus * depth**SOIL.exponent
@@ -50,12 +51,17 @@ def test_side_slip_turns_the_shear_stress(slip: float) -> None:
         across = WHEEL.radius * (1.0 - slip) * (theta_1 - theta) * tangent
         total = np.hypot(along, across)
         strength = (SOIL.cohesion + sigma * SOIL.tan_phi) * (1.0 - np.exp(-total / k))
-        return float(strength * along / total) if total else 0.0
+        return (strength * along / total, strength * across / total) if total else (0.0, 0.0)
 
     zones = ((0.0, theta_m), (theta_m, theta_1))
-    expected = WHEEL.radius**2 * WHEEL.width * sum(integrate.quad(torque, *z)[0] for z in zones)
+    along, across = (
+        sum(integrate.quad(lambda theta, n=n: stresses(theta)[n], *zone)[0] for zone in zones)
+        for n in (0, 1)
+    )
+    area = WHEEL.radius * WHEEL.width
     found = forces(WHEEL, SOIL, theta_1, slip, side_slip=tangent, order=40)
-    assert float(found.torque) == pytest.approx(expected, rel=1e-6)
+    assert float(found.torque) == pytest.approx(WHEEL.radius * area * along, rel=1e-6)
+    assert float(found.side_force) == pytest.approx(area * across, rel=1e-6)
     assert found.torque < forces(WHEEL, SOIL, theta_1, slip, order=40).torque
 
 

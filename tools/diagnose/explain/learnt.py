@@ -53,7 +53,7 @@ class _Source:
 def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) -> LearntForm | None:
     """δ of a model, for a soil that is written beside it; None for a rig or model without one."""
     stack = problem.stack
-    sources = [s for s in stack.rig.forms if not s.drive]
+    sources = [s for s in stack.rig.forms if s.name in CHANNELS]
     usual = sources[0].usual if sources else None
     if model.marginal is None or usual is None:
         return None

@@ -126,6 +126,8 @@ def _values(rig: Rig, parameter: Parameter) -> list[float]:
     if parameter.scan:
         return orders(rig, parameter)
 
+    if parameter.centre == parameter.low:  # from none of it to all
+        return [parameter.low, parameter.high]
     if parameter.sigma >= TUNING.fit.shape_known * abs(parameter.centre):
         return [factor * parameter.centre for factor in TUNING.fit.shape_factors]
     return [parameter.centre]

@@ -13,8 +13,10 @@ from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
+LEAN = "side_force_lean"
 UNITS = {
-    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m",
+    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "side_force": "N", "load": "N",
+    "sinkage": "m",
     "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s",
     "acceleration": "rad/s²", "heat": "A²·s", "run": "-", "direction": "-", "constant": "-",
 }  # fmt: skip
@@ -56,6 +58,8 @@ def _calibrations(
             of_channel(channel, "delay", TUNING.rig.timing, "s"),
             of_channel(channel, "blur", TUNING.rig.blur),
         ]
+    if "side_force" in channels:  # the sensor may lean: a share of the load
+        constants.append(Constant(LEAN, 0.0, TUNING.rig.lean))
 
     nominal = settings.load.nominal
     common = max(nominal.sigma / max(nominal.value, SPAN), TUNING.rig.least_weights)

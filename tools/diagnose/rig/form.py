@@ -14,6 +14,7 @@ from gritd.tools.diagnose.tuning import TUNING
 SOURCES = (  # name, channels that share one discrepancy, whether it turns with the direction
     ("torque", ("torque", "axle_torque"), True),
     ("drawbar_pull", ("drawbar_pull",), True),
+    ("side_force", ("side_force",), True),
     ("sinkage", ("sinkage",), False),
 )
 

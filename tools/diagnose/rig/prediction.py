@@ -15,6 +15,7 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
+from gritd.tools.diagnose.rig.constants import LEAN
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index
 from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
@@ -78,6 +79,7 @@ class Prediction:
 
         self._parts = driven.parts
         sizes = [part.stop - part.start for part in self._parts]
+        self._load = np.concatenate([m.load * np.ones(np.size(m.time)) for m in driven.motions])
         self._step: Array = np.repeat(driven.steps, sizes)
         self._inner = np.ones(sum(sizes), bool)  # with a neighbour of the same run on either side
         for part in self._parts:
@@ -177,6 +179,8 @@ class Prediction:
             for what in ("scale", "offset", "delay", "blur")
         )
         read = true * (1.0 + scale) + offset
+        if "side_force" in self._channels:
+            read[self._channels.index("side_force")] += value[LEAN] * self._load
 
         before, after = np.roll(read, 1, axis=1), np.roll(read, -1, axis=1)
         rate, bend = (after - before) / (2.0 * self._step), after + before - 2.0 * read

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +22,7 @@ def channels_of(
     """Channels that some recording has and that carry information."""
     source = {"torque": "current"}
     channels = []
-    for channel in ("torque", "axle_torque", "drawbar_pull", "sinkage", "load"):
+    for channel in ("torque", "axle_torque", "drawbar_pull", "side_force", "sinkage", "load"):
         there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
         if (
             there
@@ -40,6 +41,21 @@ def loss_measured(signals: Sequence[Signals], channels: Sequence[str]) -> bool:
     driven = [s for s in signals if _varies(s.analogue.get("current"))]
     both = all(_varies(s.analogue.get("axle_torque")) for s in driven)
     return both and {"torque", "axle_torque"} <= set(channels)
+
+
+def to_one_side(signals: Sequence[Signals]) -> list[Signals]:
+    """The side force of a campaign counted towards the side on which it acts: soil and wheel have
+    no left and right.
+    """
+    forces = [s.analogue["side_force"] for s in signals if "side_force" in s.analogue]
+    if not forces or np.nanmean(np.concatenate(forces)) >= 0.0:
+        return list(signals)
+    return [
+        replace(s, analogue=s.analogue | {"side_force": -s.analogue["side_force"]})
+        if "side_force" in s.analogue
+        else s
+        for s in signals
+    ]
 
 
 def _varies(values: Array | None) -> bool:

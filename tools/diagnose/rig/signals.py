@@ -49,7 +49,7 @@ class Signals:
     doubt: Array
     analogue: dict[
         str, Array
-    ]  # sinkage, current, temperature, drawbar_pull, load, axle_torque; those there are
+    ]  # sinkage, current, temperature, drawbar_pull, side_force, load, axle_torque; those there are
     damage: tuple[str, ...]
     left_out: str = ""  # what of the recording is not used, in words
 
@@ -222,12 +222,15 @@ def _analogue(
     time = rows["stamp"] * NS - wrench.latency
     axes = {
         "drawbar_pull": ("fx", wrench.drawbar_pull),
+        "side_force": ("fy", wrench.side_force),
         "load": ("fz", wrench.load),
         "axle_torque": ("ty", wrench.torque),
     }
 
     return analogue | {
-        name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()
+        name: _ordered(time, physical(rows[axis], c))
+        for name, (axis, c) in axes.items()
+        if c is not None
     }
 
 

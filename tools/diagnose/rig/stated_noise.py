@@ -25,6 +25,8 @@ def noise_of_readings(settings: Settings, loss_of_drive: bool) -> dict[str, floa
     if wrench is not None:
         noise["axle_torque"] = wrench.torque_noise * abs(wrench.torque.scale.value)
         noise["drawbar_pull"] = wrench.force_noise * abs(wrench.drawbar_pull.scale.value)
+        if wrench.side_force is not None:
+            noise["side_force"] = wrench.force_noise * abs(wrench.side_force.scale.value)
         noise["load"] = wrench.force_noise * abs(wrench.load.scale.value)
         if loss_of_drive and "torque" in noise:
             noise["torque"] = float(np.hypot(noise["torque"], noise["axle_torque"]))

@@ -45,7 +45,13 @@ from gritd.tools.diagnose.rig.measured_runs import (
 )
 from gritd.tools.diagnose.rig.prediction import SOIL, Driven, Prediction
 from gritd.tools.diagnose.rig.proposals import MENU
-from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
+from gritd.tools.diagnose.rig.recorded import (
+    channels_of,
+    loss_measured,
+    measured_of,
+    motion_of,
+    to_one_side,
+)
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stack import Stack
@@ -105,6 +111,7 @@ class WheelRig:
         lines, latencies: what the recordings show at their own rate; had: effects beyond the
         configured ones that the rig has in both campaigns.
         """
+        signals = to_one_side(signals)
         self._again = partial(
             WheelRig, signals, settings, reference, bed, read_off, lines, latencies
         )

@@ -62,6 +62,7 @@ class RigTuning:
     soil_least: Mapping[str, float] = tuned(
         LEAST, "-", "c in Pa, the others without a unit: no soil has less"
     )
+    lean: float = tuned(0.02, "-", "of a force sensor across the wheel: a share of the load; 1°")
     scale_floor: float = tuned(1e-3, "-", "relative: no sensor's scale is known better", DESIGN)
     least_weights: float = tuned(2e-3, "-", "relative: no weights are known better", DESIGN)
     own_weights: float = tuned(

@@ -124,6 +124,8 @@ def _set_wrench(document: EditedYaml, axes: dict[str, CalibratedChannel], interv
 
     for axis, unit in (("drawbar_pull", "N"), ("load", "N"), ("torque", "N*m")):
         _set_calibration(document, (*path, axis), axes[axis], "", unit)
+    if axes["lateral_force"].noise > 0.0:
+        _set_calibration(document, (*path, "side_force"), axes["lateral_force"], "", "N")
 
     force = max(axes[axis].noise for axis in ("drawbar_pull", "load", "lateral_force"))
     document.set((*path, "force_noise"), _noise(force or axes["torque"].noise, "N"))

@@ -1,0 +1,67 @@
+"""A wheel that is skewed to its travel, on the independent plant, whose force sensor has an fy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.estimator.config.configuration import load
+from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.rig.adapter import rig_of
+from gritd.tools.diagnose.rig.signals import read_all
+from gritd.tools.proof.blind import strata
+from gritd.tools.proof.blind.cases import BlindCase, drawn
+from gritd.tools.proof.blind.handover import CONFIGURATION, driven, write
+
+
+@pytest.fixture(scope="module")
+def skewed(tmp_path_factory: pytest.TempPathFactory) -> tuple[BlindCase, list[Path], Settings]:
+    """What is true, the recordings, and the configuration, which knows of no side force."""
+    assignment = strata.Assignment("usual", effects=("side_slip",), level=strata.USUAL)
+    case = drawn(18, 18, assignment)
+    folder = tmp_path_factory.mktemp("skewed") / "given"
+    recordings = write(case, driven(case), folder)
+    return case, recordings, load(folder / CONFIGURATION).settings
+
+
+def told(settings: Settings, scale: float) -> Settings:
+    """With a calibration of fy."""
+    assert settings.wrench is not None
+    known = Calibration(Uncertain(scale, 0.002), Uncertain(0.0, settings.wrench.force_noise))
+    return replace(settings, wrench=replace(settings.wrench, side_force=known))
+
+
+def test_soil_and_wheel_have_no_left_and_right(
+    skewed: tuple[BlindCase, list[Path], Settings],
+) -> None:
+    _, files, settings = skewed
+    recordings = read_all(files)
+    left, right = (rig_of(recordings, told(settings, s))[0].runs for s in (1.0, -1.0))
+    for one, other in zip(left, right, strict=True):
+        used = one.used["side_force"]
+        np.testing.assert_array_equal(used, other.used["side_force"])
+        ours, theirs = (run.measured["side_force"][used] for run in (one, other))
+        np.testing.assert_allclose(ours, theirs)
+
+
+def test_a_side_force_without_calibration_is_recorded_only(
+    skewed: tuple[BlindCase, list[Path], Settings],
+) -> None:
+    _, files, settings = skewed
+    assert "side_force" not in rig_of(read_all(files), settings)[0].channels
+
+
+@pytest.mark.long
+def test_a_skewed_wheel_is_named_by_its_side_force(
+    skewed: tuple[BlindCase, list[Path], Settings],
+) -> None:
+    case, files, settings = skewed
+    found = diagnose(rig_of(read_all(files), told(settings, 1.0))[0])
+    first = found.hypotheses[0]
+    assert (found.verdict, first.effect) == ("explained", "side_slip")
+    angle = first.parameters["angle"]
+    assert abs(angle.value - abs(case.effects[0].strength)) < 2.0 * angle.sigma

@@ -61,17 +61,22 @@ def ours(module: str) -> bool:
     return bool(rest) and first in ("gritd", "estimator", "drivers", "tools", "config", "tests")
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PROOF)))
-def test_no_file_imports_what_it_judges(path: Path) -> None:
-    for module in filter(ours, imported(path)):
-        assert any(module == name or module.startswith(name + ".") for name in ALLOWED), module
+def forbidden(path: Path) -> list[str]:
+    return [
+        m
+        for m in imported(path)
+        if ours(m) and not f"{m}.".startswith(tuple(f"{name}." for name in ALLOWED))
+    ]
+
+
+def test_no_file_imports_what_it_judges() -> None:
+    assert FILES and not {str(path): forbidden(path) for path in FILES if forbidden(path)}
 
 
 def test_the_walk_of_imports_sees_what_is_forbidden(tmp_path: Path) -> None:
     file = tmp_path / "cheat.py"
     file.write_text("from gritd.estimator.effects import library\n", encoding="utf-8")
-    with pytest.raises(AssertionError, match=r"gritd\.estimator\.effects"):
-        test_no_file_imports_what_it_judges(file)
+    assert any(module.startswith("gritd.estimator.effects") for module in forbidden(file))
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,8 @@ def summary(
         first = location[0]
         sentences = [f"{first.where} {p}; {_held_out(fit, first.channel)}."]
     if decision.verdict == "unlisted":
-        sentences += [_unexplained(decision), *map(_resembling, decision.resembled)]
+        resembled = [(r, decision.groups.get(r.name, ())) for r in decision.resembled]
+        sentences += [_unexplained(decision), *(_resembling(*each) for each in resembled)]
         return " ".join(sentences)
 
     names = listed(list(decision.best.names))
@@ -117,12 +118,13 @@ def _unexplained(decision: Decision) -> str:
     )
 
 
-def _resembling(of: Resembled) -> str:
-    """What resembles the misfit and why it does not explain it."""
+def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
+    """What resembles the misfit as well as its rivals do, and why it does not explain it."""
     bent = of.forms > TUNING.explain.bent_far
     why = f"in a form {of.forms:.0%} off ours" if bent else "and no more of it"
     where = PLACE_OF[EFFECTS[of.name].stage]
-    return (
-        f"It resembles {of.name}, which takes {of.share:.0%} of the misfit, {why}: probably"
-        f" something else in {where}."
-    )
+    taken = f"takes {of.share:.0%} of the misfit, {why}: probably something else in {where}."
+    if not rivals:
+        return f"It resembles {of.name}, which {taken}"
+    alike = ", ".join((of.name, *sorted(rivals)))
+    return f"It resembles {alike}, which these recordings do not distinguish. {of.name} {taken}"

@@ -42,7 +42,7 @@ def campaign(folder: Path, seed: int, *effects: str) -> list[str]:
 
 def diagnosed(files: list[str], configuration: Path, folder: Path) -> tuple[dict[str, Any], Path]:
     """The JSON, and the configuration that --apply wrote."""
-    result, applied = folder / "d.json", folder / "new.yaml"
+    result, applied = folder / "d.json", folder / f"{configuration.stem}-new.yaml"
     assert (
         main(
             [*files, "--config", str(configuration), "--json", str(result), "--apply", str(applied)]

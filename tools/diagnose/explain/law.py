@@ -20,12 +20,12 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain import wording
 from gritd.tools.diagnose.explain.result import Law, Location, Quantity
-from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
+from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.heldout import HeldOut, held_out, run_folds
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
+from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.fit.signatures import signature
-from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import LawForm
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.scans import in_step
@@ -134,29 +134,13 @@ def _terms(start: Start, form: LawForm, names: list[str], domain: Domain) -> tup
         return ()
 
     strengths = [p.name for p in parameters.values() if p.role == "strength"]
-    columns = whiten(start.problem.noise, made.columns[:, [strengths.index(n) for n in names]])
-    kept = _forward(fitted, columns)
+    each = [
+        replace(made, columns=made.columns[:, [strengths.index(name)]], prior=-np.log(len(names)))
+        for name in names
+    ]
+    parts = parts_of(fitted.projection(), start.problem.noise, each)
+    kept = take_up(parts, range(len(each)), len(each)).parts
     return tuple(Free(form.effect, parameters[names[i]], form.effect.name) for i in kept)
-
-
-def _forward(fitted: Fitted, columns: Array) -> list[int]:
-    """Terms by evidence, until the next no longer pays."""
-    a, b = fitted.projection().project(columns)
-    kept: list[int] = []
-    best = 0.0
-
-    while len(kept) < len(b):
-        tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
-        i = max(tried, key=lambda k: tried[k])
-        if tried[i] < best + TUNING.explain.pays:
-            break
-        kept, best = [*kept, i], tried[i]
-
-    return kept
-
-
-def _value(a: Array, b: Array, index: list[int]) -> float:
-    return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
 def _with_terms(start: Start, free: tuple[Free, ...], form: LawForm, domain: Domain) -> Fitted:

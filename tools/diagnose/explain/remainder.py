@@ -2,78 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.wording import shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import Discrepancy, Remainder
-from gritd.tools.diagnose.explain.wording import signed, value_of
+from gritd.tools.diagnose.explain.wording import along_covariate, signed
+from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.stack import Stack
+from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SPAN
+from gritd.tools.diagnose.tuning.guards import SQUARE
 
 WITHIN = "within the noise"
-ALONG = ("slip", "load", "speed", "position", "time", "wheel_angle")
+ALONG = [(name,) for name in ("slip", "load", "speed", "position", "time", "wheel_angle")]
 
 
-def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
+def remainders(screening: Screening, model: Model) -> Mapping[str, Remainder]:
     """Of each channel: what the model predicts without its discrepancies, against the recording,
     beyond the noise.
     """
+    problem, told = screening.problem, {}
     stack, rig = problem.stack, problem.stack.rig
     left = stack.measured - model.fitted.predicted
-    told = {}
 
     for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
-        own = np.flatnonzero(stack.of(channel))
-        squares = float(np.mean(left[own] ** 2)) - colour.sigma**2
+        squares = float(np.mean(left[stack.of(channel)] ** 2)) - colour.sigma**2
         size = float(np.sqrt(max(squares, 0.0)))
-        where = (
-            _where(stack, channel, left)
-            if size > TUNING.explain.remainder_noise * colour.sigma
-            else WITHIN
-        )
+        near = size <= TUNING.explain.remainder_noise * colour.sigma
+        functions = [s for s in screening.functions if s.shape.channel == channel]
+        where = WITHIN if near else _where(stack, channel, functions, left)
         told[channel] = Remainder(size, rig.units[channel], where)
 
     return told
 
 
-def _where(stack: Stack, channel: str, left: Array) -> str:
+def _where(stack: Stack, channel: str, functions: Sequence[Signature], left: Array) -> str:
     """Along which condition a channel's remainder (N,) changes most, in words."""
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
-    unit = stack.rig.units[channel]
+    shares = {name: _share(s.columns[own], left[own]) for s in functions
+              for name in s.shape.along if s.shape.along in ALONG}  # fmt: skip
+    name = max(shares, key=lambda n: shares[n], default="")
+    if shares.get(name, 0.0) >= TUNING.explain.remainder_share:
+        return along_covariate(stack, left, channel, name)
     mean = float(np.mean(left[own])) if own.any() else 0.0
-
-    known = [name for name in ALONG if name in stack.rig.runs[0].covariates]
-    shares = {name: _share(stack.covariate(name)[own], left[own]) for name in known}
-    name = max(shares, key=lambda n: shares[n])
-    if shares[name] < TUNING.explain.remainder_share:
-        return f"{signed(mean, unit)} on average, uncorrelated with any covariate"
-
-    along = stack.covariate(name)[own]
-    edges = np.quantile(along, np.linspace(0.0, 1.0, TUNING.explain.remainder_parts + 1))
-    low, high = along <= edges[1], along >= edges[-2]
-    ends = [
-        f"{signed(float(np.mean(left[own][part])), unit)} at "
-        f"{value_of(stack, name, float(along[part].mean()))}"
-        for part in (low, high)
-    ]
-    return ", ".join(ends)
+    return f"{signed(mean, stack.rig.units[channel])} on average, uncorrelated with any covariate"
 
 
-def _share(along: Array, left: Array) -> float:
-    """Share of the squares about the mean that a smooth function of a covariate takes."""
-    if along.size < TUNING.explain.remainder_values or np.ptp(along) <= SPAN:
-        return 0.0
-    scaled = (along - along.mean()) / np.ptp(along)
-    columns = np.vander(scaled, TUNING.explain.remainder_bends + 1)
-    fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
-    spread = float(np.sum((left - left.mean()) ** 2))
-    return 1.0 - float(np.sum((left - fitted) ** 2)) / spread if spread > 0.0 else 0.0
+def _share(columns: Array, left: Array) -> float:
+    """Share of the squares about the mean that functions (n, m) take."""
+    about, columns = left - left.mean(), columns - columns.mean(axis=0)
+    fitted = columns @ np.linalg.lstsq(columns, about, rcond=None)[0]
+    return 1.0 - float(np.sum((about - fitted) ** 2)) / max(float(about @ about), SQUARE)
 
 
 def missed_words(channel: str, left: Remainder) -> str:

@@ -7,7 +7,7 @@ out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,18 +16,18 @@ from gritd.tools.cli.wording import (
     covariate_shown,
     fixed,
     listed,
+    magnitude,
     number,
     percent,
     shown,
     spaced,
     spelled,
 )
-from gritd.tools.diagnose.explain import changes
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
-from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 AT = {  # a value of a covariate, in words
     "slip": "{} slip",
@@ -41,7 +41,6 @@ AT = {  # a value of a covariate, in words
     "acceleration": "{}",
 }
 PLACES = {"time": "over time", "position": "along the bed"}
-WINDOW = 2  # change points between which something is another
 TIMES = {1: "once", 2: "twice"}
 
 
@@ -63,76 +62,25 @@ def described(shape: Shape) -> str:
 
 
 def sentence(
-    stack: Stack, residual: Array, shape: Shape, places: Sequence[float], share: float
+    stack: Stack, residual: Array, shape: Shape, covariate: str, share: float, size: float = 0.0
 ) -> str:
-    """What a channel (residual (N,) of the stack) does along a smooth shape; places: its change
-    points.
+    """What a channel (residual (N,) of the stack) does along a covariate, in such a shape; size: of
+    a wave, its amplitude in the channel's unit.
     """
-    channel, (covariate, *others) = shape.channel, shape.along
-    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
-    own = own if own.any() else stack.of(channel)
-    say = _sizes(stack, channel)
-
-    if covariate == "run":
-        words = _runs(stack, residual, own, places, say)
-    elif covariate == "constant":
-        words = _everywhere(residual, own, stack.of(channel) & ~own, say)
-    elif covariate == "wheel_angle":
-        words = _turn(stack, residual, own, channel)
-    elif covariate == "direction":
-        words = _directions(stack, residual, own, say)
-    elif places:
-        words = _between(stack, residual, own, covariate, places, say)
-    elif others:
-        words = _corner(stack, residual, own, shape.along, say)
-    else:
-        words = _along(stack, residual, own, covariate, say)
-    return _started(f"{spelled(channel)}, {words}; {percent(share)} of its misfit")
-
-
-def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: float) -> str:
-    """A ripple of so many times a turn and its amplitude in the channel's unit."""
-    size = _amplitude(stack, channel, amplitude)
-    words = f"ripples {_times(order)} a turn, {size}"
-    return _started(f"{spelled(channel)}, {words}; {percent(share)} of its misfit")
-
-
-def wave(stack: Stack, residual: Array, shape: Shape, share: float) -> str:
-    """A wave of a residual (N,) in time or along the bed, its amplitude the root of the mean square
-    over the stretches.
-    """
-    channel, (axis,), frequency = shape.channel, shape.along, shape.at
-    assert frequency is not None
-
-    x, squares, count = stack.covariate(axis), 0.0, 0
-    for index in lines.stretches(stack, channel):
-        pair = lines.waves(x[index], np.array([frequency]))[:, 0]
-        columns = np.column_stack((pair, np.ones(index.size)))
-        fitted = np.linalg.lstsq(columns, residual[index], rcond=None)[0]
-        squares += index.size * float(fitted[0] ** 2 + fitted[1] ** 2)
-        count += index.size
-
-    size = _amplitude(stack, channel, float(np.sqrt(squares / max(count, 1))))
-    length = _wavelength(stack, axis, 1.0 / frequency)
-    period, waves = f"oscillates with a period of {length}", f"waves of {length} along the bed"
-    words = period if axis == "time" else waves
-    return _started(f"{spelled(channel)}, {words}, {size}; {percent(share)} of its misfit")
-
-
-def term(stack: Stack, shape: Shape, size: float) -> str:
-    """A wave or a step as a term of a law; size in the channel's unit."""
-    (axis,), at = shape.along, shape.at
-    assert at is not None
+    told = _Told(stack, residual, shape.channel)
     if shape.kind == "wave":
-        amplitude = _amplitude(stack, shape.channel, abs(size))
-        return f"{amplitude} every {_wavelength(stack, axis, 1.0 / at)}"
-    step = signed(size, stack.rig.units[shape.channel])
-    return f"{step} beyond {value_of(stack, axis, at)}"
+        words = _oscillates(stack, shape, size)
+    elif shape.kind != "smooth":
+        words = told.between(shape)
+    else:
+        ways = {"run": told.runs, "constant": told.everywhere, "direction": told.directions}
+        words = ways[covariate]() if covariate in ways else told.along(covariate)
+    return _started(f"{spelled(shape.channel)}, {words}; {percent(share)} of its misfit")
 
 
-def _wavelength(stack: Stack, axis: str, length: float) -> str:
-    unit, factor = shown(stack.rig.units[axis])
-    return spaced(length * factor, unit, 3)
+def along_covariate(stack: Stack, residual: Array, channel: str, covariate: str) -> str:
+    """What a channel of a residual (N,) does along a covariate, without its name."""
+    return _Told(stack, residual, channel).along(covariate)
 
 
 def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:
@@ -142,43 +90,13 @@ def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> s
     return _started(f"{spelled(channel)}, {moved}")
 
 
-def _started(words: str) -> str:
-    return words[:1].upper() + words[1:]
-
-
-# ---- pieces ------------------------------------------------------------------------------------
-
-Say = Callable[[float], str]
-
-
-def _sizes(stack: Stack, channel: str) -> Say:
-    """A mean residual, as more or less than the model."""
-    unit, factor = shown(stack.rig.units[channel])
-    return lambda mean: (
-        f"{spaced(abs(mean) * factor, unit, 2)} {'more' if mean >= 0.0 else 'less'} than the model"
-    )
-
-
-def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
-    """Friction acts while the wheel turns, an offset at rest too."""
-    mean = float(residual[own].mean())
-
-    if not rest.any():
-        return f"everywhere {say(mean)}"
-    still = float(residual[rest].mean())
-    if abs(still - mean) < TUNING.explain.means_alike * abs(mean):
-        return f"at rest as while the wheel turns {say(mean)}"
-
-    known = (
-        "as the model"
-        if abs(still) < TUNING.explain.means_alike * abs(mean)
-        else _brief(say(still))
-    )
-    return f"while the wheel turns {say(mean)}, at rest {known}"
-
-
-def _brief(words: str) -> str:
-    return words.replace(" than the model", "")
+def term(stack: Stack, shape: Shape, size: float) -> str:
+    """A wave or a step as a term of a law; size in the channel's unit."""
+    (axis,), at = shape.along, shape.at
+    assert at is not None
+    if shape.kind == "wave":
+        return f"{_amplitude(stack, shape.channel, size)} every {_length(stack, axis, 1.0 / at)}"
+    return f"{signed(size, stack.rig.units[shape.channel])} beyond {value_of(stack, axis, at)}"
 
 
 def signed(value: float, unit: str) -> str:
@@ -189,212 +107,146 @@ def signed(value: float, unit: str) -> str:
 
 def value_of(stack: Stack, covariate: str, value: float) -> str:
     """A value of a covariate in words, such as `30 % slip`."""
-    return AT.get(covariate, "{}").format(_value(stack, covariate, value))
-
-
-def _value(stack: Stack, covariate: str, value: float) -> str:
     unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
-    return spaced(value * factor, unit, _digits(covariate, value * factor))
+    digits = 3 if covariate in PLACES else 2
+    return AT.get(covariate, "{}").format(spaced(value * factor, unit, digits))
 
 
-def _apart(stack: Stack, covariate: str, values: Sequence[float]) -> list[str]:
-    """Values of a covariate, each in as many digits as tell it from the others; 0 for one that is
-    nothing beside them.
-    """
-    unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
-    least = TUNING.explain.reads_nothing * max(abs(v) for v in values)
-    known = [v * factor if abs(v) > least else 0.0 for v in values]
-
-    texts: list[str] = []
-    for more in range(TUNING.explain.more_digits + 1):
-        texts = [spaced(v, unit, _digits(covariate, v) + more) for v in known]
-        if len(set(texts)) == len(texts):
-            break
-    return texts
+# ---- pieces ------------------------------------------------------------------------------------
 
 
-def _digits(covariate: str, value: float) -> int:
-    return 3 if covariate in ("position", "time") and abs(value) >= TUNING.explain.long_place else 2
+def _started(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
-def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) -> str:
-    """Means at the low and the high end, and in the middle where that stands out."""
-    x = stack.covariate(covariate)
-    ends = [
-        _quantiles(x, residual, own, part)
-        for part in (TUNING.explain.low_end, TUNING.explain.middle, TUNING.explain.high_end)
-    ]
-    (_, low), (_, middle), (_, high) = ends
-
-    outside = max(middle - max(low, high), min(low, high) - middle)
-    if outside <= TUNING.explain.middle_stands_out * abs(high - low):
-        ends = [ends[0], ends[2]]
-
-    (first, mean), *rest = ends
-    at, *beyond = _apart(stack, covariate, [first, *(v for v, _ in rest)])
-    others = [f"{_brief(say(m))} at {v}" for (_, m), v in zip(rest, beyond, strict=True)]
-    return ", ".join([f"{say(mean)} at {AT.get(covariate, '{}').format(at)}", *others])
-
-
-def _quantiles(
-    x: Array, residual: Array, own: Bools, part: tuple[float, float]
-) -> tuple[float, float]:
-    """Mean covariate and mean residual between two quantiles of the covariate."""
-    low, high = np.quantile(x[own], part)
-    inside = own & (x >= low) & (x <= high)
-    return float(x[inside].mean()), float(residual[inside].mean())
-
-
-def _between(
-    stack: Stack, residual: Array, own: Bools, covariate: str, places: Sequence[float], say: Say
-) -> str:
-    """The stretch between change points that is farthest from the rest."""
-    x = changes.values(stack, covariate)
-    assert x is not None
-    low, high, inside = _stretch(x, residual, own, places)
-
-    if len(places) == WINDOW:
-        low, high = sorted(places)
-        inside = own & (x > low) & (x <= high)
-
-    rest = own & ~inside
-    here, elsewhere = float(residual[inside].mean()), float(residual[rest].mean())
-    return f"{_span(stack, covariate, low, high)} {say(here)}, elsewhere {_brief(say(elsewhere))}"
-
-
-def _stretch(
-    x: Array, residual: Array, own: Bools, places: Sequence[float]
-) -> tuple[float, float, Bools]:
-    """Ends (infinite where open) and values of the stretch that differs most from the rest."""
-    edges = [-np.inf, *sorted(places), np.inf]
-    stretches = [
-        (a, b, own & (x > a) & (x <= b)) for i, a in enumerate(edges) for b in edges[i + 1 :]
-    ]
-    stretches = [s for s in stretches if s[2].any() and (own & ~s[2]).any()]
-    return max(stretches, key=lambda s: _contrast(residual[s[2]], residual[own & ~s[2]]))
-
-
-def shows(stack: Stack, residual: Array, channel: str, places: Sequence[float]) -> bool:
-    """Whether changes between runs take most of what the means of a residual (N,) differ by."""
-    number_of, own = (
-        changes.values(stack, "run"),
-        stack.of(channel) & (stack.covariate("speed") > 0.0),
-    )
-    assert number_of is not None
-
-    numbers = np.unique(number_of[own])
-    means = np.array([residual[own & (number_of == n)].mean() for n in numbers])
-
-    side = np.searchsorted(sorted(places), numbers)
-    level = np.array([means[side == k].mean() for k in side])
-    return bool(
-        np.sum((level - means.mean()) ** 2)
-        >= TUNING.explain.runs_show * np.sum((means - means.mean()) ** 2)
-    )
-
-
-def _contrast(inside: Array, rest: Array) -> tuple[float, float]:
-    """Squares that two means instead of one take up; then which side is farther off nought."""
-    between = (
-        (inside.mean() - rest.mean()) ** 2 * inside.size * rest.size / (inside.size + rest.size)
-    )
-    return round(float(between), TUNING.explain.equal_places), abs(float(inside.mean())) - abs(
-        float(rest.mean())
-    )
-
-
-def _span(stack: Stack, covariate: str, low: float, high: float) -> str:
-    """A stretch in words; infinite ends are open."""
-    if np.isfinite(low) and np.isfinite(high):
-        _, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
-        first = number(low * factor, _digits(covariate, low * factor))
-        return f"from {first} to {value_of(stack, covariate, high)}"
-    edge = value_of(stack, covariate, low if np.isfinite(low) else high)
-    return f"{'beyond' if np.isfinite(low) else 'up to'} {edge}"
-
-
-def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], say: Say) -> str:
-    number_of = changes.values(stack, "run")
-    assert number_of is not None
-    numbers = np.unique(number_of[own])
-    names = {float(n): stack.rig.runs[int(stack.run[number_of == n][0])].name for n in numbers}
-    means = {float(n): float(residual[own & (number_of == n)].mean()) for n in numbers}
-
-    if places:
-        low, high, inside = _stretch(number_of, residual, own, places)
-        within = [names[n] for n in names if low < n <= high]
-        span = f"in {within[0]}" if len(within) == 1 else f"from {within[0]} to {within[-1]}"
-        rest = float(residual[own & ~inside].mean())
-        return (
-            f"{span} {say(float(residual[inside].mean()))}, in the other runs {_brief(say(rest))}"
-        )
-
-    levels = np.array(list(means.values()))
-    if levels.size > 1 and np.ptp(levels) < TUNING.explain.means_alike * np.abs(levels).min():
-        return f"in all runs {say(float(levels.mean()))}"
-
-    told = list(names)
-    if len(told) > TUNING.explain.runs_named:
-        told = sorted(sorted(told, key=lambda n: -abs(means[n]))[: TUNING.explain.runs_far_named])
-    each = [f"{_brief(say(means[n]))} in {names[n]}" for n in told]
-    return (
-        f"{'from run to run' if len(told) == len(names) else 'most'}: {listed(each)} than the model"
-    )
-
-
-def _turn(stack: Stack, residual: Array, own: Bools, channel: str) -> str:
-    """Once or twice a turn, whichever is larger."""
-    angle = stack.covariate("wheel_angle")[own]
-    columns = np.column_stack(
-        [np.ones(angle.size), *(f(o * angle) for o in TIMES for f in (np.cos, np.sin))]
-    )
-    fitted = np.linalg.lstsq(columns, residual[own], rcond=None)[0]
-    sizes = {order: float(np.hypot(*fitted[2 * order - 1 : 2 * order + 1])) for order in TIMES}
-    order = max(sizes, key=lambda o: sizes[o])
-    return f"varies {TIMES[order]} a turn, {_amplitude(stack, channel, sizes[order])}"
+def _brief(words: str) -> str:
+    return words.replace(" than the model", "")
 
 
 def _amplitude(stack: Stack, channel: str, amplitude: float) -> str:
     unit, factor = shown(stack.rig.units[channel])
-    return f"± {spaced(amplitude * factor, unit, 2)}"
+    return f"± {spaced(abs(amplitude) * factor, unit, 2)}"
 
 
-def _times(order: float) -> str:
-    return TIMES.get(int(order), f"{order:.0f} times")
+def _length(stack: Stack, axis: str, length: float) -> str:
+    unit, factor = shown(stack.rig.units[axis])
+    return spaced(length * factor, unit, 3)
 
 
-def _directions(stack: Stack, residual: Array, own: Bools, say: Say) -> str:
-    forward = stack.covariate("direction") > 0.0
-    means = [float(residual[side].mean()) for side in (own & forward, own & ~forward) if side.any()]
-    if len(means) < 2:
-        return say(means[0])
-    return f"{say(means[0])} forward, {_brief(say(means[1]))} backward"
+def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
+    (axis,), at = shape.along, shape.at
+    assert at is not None
+    amplitude = _amplitude(stack, shape.channel, size)
+    if axis == "wheel_angle":
+        turns = round(2.0 * np.pi * at, 2)
+        return f"ripples {TIMES.get(int(turns), f'{turns:.4g} times')} a turn, {amplitude}"
+    length = _length(stack, axis, 1.0 / at)
+    if axis == "time":
+        return f"oscillates with a period of {length}, {amplitude}"
+    return f"waves of {length} along the bed, {amplitude}"
 
 
-def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say: Say) -> str:
-    """Of the four corners of two covariates the one that is farthest off."""
-    x, y = (stack.covariate(name) for name in names)
-    corners = []
-    for first in (TUNING.explain.low_end, TUNING.explain.high_end):
-        for second in (TUNING.explain.low_end, TUNING.explain.high_end):
-            inside = own & _within(x, own, first) & _within(y, own, second)
-            if inside.any():
-                corners.append((float(residual[inside].mean()), inside))
+class _Told:
+    """What a channel's residual is, as more or less than the model."""
 
-    if not corners:
-        return _along(stack, residual, own, names[0], say)
-    mean, inside = max(corners, key=lambda c: abs(c[0]))
+    def __init__(self, stack: Stack, residual: Array, channel: str) -> None:
+        own = stack.of(channel)
+        driving = own & (stack.covariate("speed") > 0.0)
+        self._stack, self._residual = stack, residual
+        self._own = driving if driving.any() else own
+        self._rest: Bools = own & ~self._own
+        self._unit, self._factor = shown(stack.rig.units[channel])
 
-    place = " and ".join(
-        value_of(stack, n, float(v[inside].mean())) for n, v in zip(names, (x, y), strict=True)
-    )
-    return f"at {place} {say(mean)}, elsewhere {_brief(say(float(residual[own & ~inside].mean())))}"
+    def _mean(self, part: Bools) -> float:
+        return float(self._residual[part].mean())
 
+    def _say(self, mean: float) -> str:
+        size = spaced(abs(mean) * self._factor, self._unit, 2)
+        return f"{size} {'more' if mean >= 0.0 else 'less'} than the model"
 
-def _within(x: Array, own: Bools, part: tuple[float, float]) -> Bools:
-    """The lower or the upper third of a covariate: the outer ends of two may never meet."""
-    low, high = np.quantile(
-        x[own], (0.0, 1.0 / 3.0) if part == TUNING.explain.low_end else (2.0 / 3.0, 1.0)
-    )
-    inside: Bools = (x >= low) & (x <= high)
-    return inside
+    def everywhere(self) -> str:
+        """Friction acts while the wheel turns, an offset at rest too."""
+        mean, alike = self._mean(self._own), TUNING.explain.means_alike
+        if not self._rest.any():
+            return f"everywhere {self._say(mean)}"
+        still = self._mean(self._rest)
+        if abs(still - mean) < alike * abs(mean):
+            return f"at rest as while the wheel turns {self._say(mean)}"
+        known = "as the model" if abs(still) < alike * abs(mean) else _brief(self._say(still))
+        return f"while the wheel turns {self._say(mean)}, at rest {known}"
+
+    def along(self, covariate: str) -> str:
+        """Means at the low and the high end, and in the middle where that is not between them."""
+        x, index = self._stack.covariate(covariate), np.flatnonzero(self._own)
+        parts = np.array_split(index[np.argsort(x[index], kind="stable")], TUNING.explain.parts)
+        ends = [parts[0], parts[len(parts) // 2], parts[-1]]
+        (low, middle, high) = (float(self._residual[part].mean()) for part in ends)
+        told = [0, 2] if min(low, high) <= middle <= max(low, high) else [0, 1, 2]
+
+        at = self._apart(covariate, [float(x[ends[k]].mean()) for k in told])
+        first, *rest = (self._say((low, middle, high)[k]) for k in told)
+        others = (f"{_brief(say)} at {v}" for say, v in zip(rest, at[1:], strict=True))
+        return ", ".join([f"{first} at {AT.get(covariate, '{}').format(at[0])}", *others])
+
+    def _apart(self, covariate: str, values: Sequence[float]) -> list[str]:
+        """Values of a covariate, to a hundredth of what they differ by."""
+        unit, factor = covariate_shown(covariate, self._stack.rig.units.get(covariate, ""))
+        places = max(1 - magnitude(max(float(np.ptp(values)) * factor, SPAN)), 0)
+        return [f"{fixed(v * factor, places)} {unit}".rstrip() for v in values]
+
+    def between(self, shape: Shape) -> str:
+        """The stretch of a window, or that side of a step which is farther off."""
+        (covariate,), places = shape.along, shape.places
+        x = self._stack.covariate(covariate)
+        low, high = (*places, np.inf)[:2]
+        inside = self._own & (x > low) & (x <= high)
+        if len(places) == 1 and abs(self._mean(inside)) < abs(self._mean(self._own & ~inside)):
+            low, high, inside = -np.inf, low, self._own & ~inside
+
+        here, elsewhere = self._mean(inside), _brief(self._say(self._mean(self._own & ~inside)))
+        if covariate != "run":
+            return f"{self._span(covariate, low, high)} {self._say(here)}, elsewhere {elsewhere}"
+        names = [name for number, name in self._names().items() if low < number <= high]
+        span = f"in {names[0]}" if len(names) == 1 else f"from {names[0]} to {names[-1]}"
+        return f"{span} {self._say(here)}, in the other runs {elsewhere}"
+
+    def _span(self, covariate: str, low: float, high: float) -> str:
+        """A stretch in words; infinite ends are open."""
+        if np.isinf(high):
+            return f"beyond {value_of(self._stack, covariate, low)}"
+        end = value_of(self._stack, covariate, high)
+        if np.isinf(low):
+            return f"up to {end}"
+        _, factor = covariate_shown(covariate, self._stack.rig.units.get(covariate, ""))
+        return f"from {number(low * factor, 3 if covariate in PLACES else 2)} to {end}"
+
+    def _names(self) -> dict[float, str]:
+        """Of the channel's runs, by their number in order of time."""
+        number_of, runs = self._stack.covariate("run"), self._stack.rig.runs
+        return {
+            float(n): runs[int(self._stack.run[number_of == n][0])].name
+            for n in np.unique(number_of[self._own])
+        }
+
+    def runs(self) -> str:
+        number_of = self._stack.covariate("run")
+        means = {
+            name: self._mean(self._own & (number_of == n)) for n, name in self._names().items()
+        }
+        levels = np.array(list(means.values()))
+        if levels.size > 1 and np.ptp(levels) < TUNING.explain.means_alike * np.abs(levels).min():
+            return f"in all runs {self._say(float(levels.mean()))}"
+
+        far = sorted(means, key=lambda name: -abs(means[name]))[: TUNING.explain.runs_named]
+        each = [f"{_brief(self._say(means[name]))} in {name}" for name in means if name in far]
+        most = "from run to run" if len(far) == len(means) else "most"
+        return f"{most}: {listed(each)} than the model"
+
+    def directions(self) -> str:
+        forward = self._stack.covariate("direction") > 0.0
+        sides = {"forward": self._own & forward, "backward": self._own & ~forward}
+        means = {word: self._mean(side) for word, side in sides.items() if side.any()}
+        if len(means) < 2:
+            return self._say(*means.values())
+        ahead, back = means.values()
+        return f"{self._say(ahead)} forward, {_brief(self._say(back))} backward"

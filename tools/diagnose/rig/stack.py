@@ -33,7 +33,12 @@ class Stack:
         return np.concatenate(pieces) if pieces else np.zeros(0)
 
     def covariate(self, name: str) -> Array:
-        """Of every value (N,), in the unit of the rig's `units`."""
+        """Of every value (N,), in the unit of the rig's `units`; run: the number of its run, from
+        1, in order of time.
+        """
+        if name == "run":
+            began = [run.time[0] for run in self.rig.runs]
+            return (np.argsort(np.argsort(began, kind="stable"))[self.run] + 1).astype(float)
         return self.joined(
             [dict.fromkeys(self.rig.channels, run.covariates[name]) for run in self.rig.runs]
         )

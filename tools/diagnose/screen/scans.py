@@ -19,11 +19,16 @@ from scipy.special import digamma
 
 from gritd.estimator.effects.base import order_of
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Signature, log_sum, strength_sizes
+from gritd.tools.diagnose.fit.evidence import (
+    Signature,
+    log_bayes_alone,
+    log_sum,
+    strength_sizes,
+)
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Projection, WhitenedBlock
-from gritd.tools.diagnose.fit.ripples import line_columns
+from gritd.tools.diagnose.fit.ripples import line_columns, orders_shown
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -37,7 +42,7 @@ from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 class Family:
     """A channel's waves or steps along an axis.
 
-    at:     frequencies [1/s, 1/m] or places [s, m] (f,).
+    at:     frequencies [1/s, 1/m, 1/rad] or places [s, m, …] (f,).
     blocks: values whose shapes have coefficients of their own; their columns are (n, f · c), c for
             each of `at`.
     near:   of waves, (f, f) 1 for neighbours in the spectrum.
@@ -57,7 +62,7 @@ class Family:
         """Whether all blocks have one coefficient: of waves in time never, of waves along the bed
         it is not known.
         """
-        if len(self.blocks) == 1:
+        if len(self.blocks) == 1 or self.axis == "wheel_angle":
             return (True,)
         return (False,) if self.axis == "time" else (False, True)
 
@@ -135,6 +140,19 @@ def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[F
     return tuple(family for family in searched if family.blocks and family.at.size)
 
 
+def more_families(stack: Stack, noise: Noise) -> tuple[Family, ...]:
+    """Where else a misfit may live: ripples of the wheel, steps along slip and between runs."""
+    searched = []
+    for channel in stack.rig.channels:
+        turning = orders_shown(stack, 1.0) / (2.0 * np.pi)
+        searched.append(waves(stack, noise, channel, "wheel_angle", turning, stack.new))
+        for axis in ("slip", "run"):
+            at = places(stack, channel, axis)
+            searched.append(steps(stack, noise, channel, axis, at, stack.new))
+
+    return tuple(family for family in searched if family.blocks and family.at.size)
+
+
 def waves(
     stack: Stack,
     noise: Noise,
@@ -181,13 +199,15 @@ def steps(
 
 
 def places(stack: Stack, channel: str, axis: str) -> Array:
-    """Where a step may be [s, m] (p,): as many values between two as between others, some on either
-    side of all.
+    """Where a step may be [s, m, …] (p,): between two runs, or as many values between two as
+    between others, some on either side of all.
     """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     x = stack.covariate(axis)[own]
     if x.size < 2 * TUNING.screen.step_values or np.ptp(x) <= SPAN:
         return np.zeros(0)
+    if axis == "run":
+        return np.arange(x.min(), x.max()) + 0.5
 
     ordered = np.sort(x)
     beyond = np.unique(
@@ -203,9 +223,8 @@ def _risen(stack: Stack, rows: slice, axis: str, at: Array, acting: Bools | None
     """(n, p) from 0 to 1 at each place while the wheel moves, on the values that may act."""
     x, moving = stack.covariate(axis)[rows], (stack.covariate("speed") > 0.0)[rows]
     where = (moving & (stack.new if acting is None else acting)[rows])[:, None]
-    width = TUNING.screen.step_width * (
-        float(np.ptp(x[moving])) if axis == "position" else TUNING.noise.stretch
-    )
+    span = {"time": TUNING.noise.stretch, "run": 1.0}.get(axis) or float(np.ptp(x[moving]))
+    width = TUNING.screen.step_width * span
     return np.asarray(np.where(where, 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0))
 
 
@@ -222,11 +241,10 @@ def _block(noise: Noise, rows: slice, raw: Array) -> WhitenedBlock:
 # ---- those that stand out ----------------------------------------------------------------------
 
 
-def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> list[Signature]:
+def candidates(search: Sequence[Family], problem: Problem, beside: Projection) -> list[Signature]:
     """The likeliest shapes of every family beside a model, each with its log share among all that
     were tried.
     """
-    beside = without_harmonics(problem, fitted)
     return [peak for family in search for peak in _peaks(family, problem, beside)]
 
 
@@ -242,8 +260,28 @@ def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Sig
         shared = family.phases[int(np.argmax(every[:, place]))]
         wave = family.shape.kind == "wave"
         at = float(family.at[place])
-        at = _refined(family, problem, beside, int(place), shared) if wave else at
+        if wave and family.axis != "wheel_angle":
+            at = _refined(family, problem, beside, int(place), shared)
         yield _signature(problem.stack, replace(family.shape, at=at, shared=shared), share)
+
+
+def windows(search: Sequence[Family], problem: Problem, beside: Projection) -> Iterator[Signature]:
+    """The likeliest stretch between two steps of every family of steps beside a model, with its log
+    share among all that were tried.
+    """
+    for family in search:
+        if family.shape.kind != "step" or family.at.size < 2:
+            continue
+        columns = family.blocks[0].columns.astype(float)
+        _, inside, b = beside.project_block(family.blocks[0])
+        a = columns.T @ columns - inside.T @ inside
+        i, j = np.triu_indices(family.at.size, 1)
+        value = log_bayes_alone(a[i, i] + a[j, j] - 2.0 * a[i, j], b[i] - b[j])
+        best, share = int(np.argmax(value)), -float(np.log(value.size))
+        if value[best] + share > 0.0:
+            first, last = (float(family.at[k[best]]) for k in (i, j))
+            shape = replace(family.shape, kind="window", at=first, until=last)
+            yield _signature(problem.stack, shape, share)
 
 
 def _refined(
@@ -293,15 +331,16 @@ def _signature(stack: Stack, shape: Shape, prior: float) -> Signature:
 
 
 def shape_columns(stack: Stack, shape: Shape) -> Array:
-    """One wave or step (N, m), of the expected size of a misfit; of a wave two columns, or two a
-    stretch.
+    """One wave, step or window (N, m), of the expected size of a misfit; of a wave two columns, or
+    two a stretch.
     """
     assert shape.at is not None
     (axis,) = shape.along
     size = size_of(stack, shape.channel)
-    if shape.kind == "step":
+    if shape.kind != "wave":
         rows, out = _rows(stack.of(shape.channel)), np.zeros((stack.size, 1))
-        out[rows] = size * _risen(stack, rows, axis, np.array([shape.at]))
+        risen = size * _risen(stack, rows, axis, np.array(shape.places))
+        out[rows] = risen[:, :1] - risen[:, 1:].sum(axis=1, keepdims=True)
         return out
 
     parts = _stretches(stack, shape.channel, stack.new)

@@ -74,7 +74,8 @@ class Screening:
         """What the form of the model cannot be: smooth functions of time and place, and the
         likeliest waves and steps beside a model.
         """
-        return [*self.beyond_form, *candidates(self.families, self.problem, model.fitted)]
+        beside = without_harmonics(self.problem, model.fitted)
+        return [*self.beyond_form, *candidates(self.families, self.problem, beside)]
 
 
 def prepare_screening(base: BaseFit) -> Screening:

@@ -13,30 +13,6 @@ Range = tuple[float, float]
 class Explain:
     """What of a diagnosis is reported."""
 
-    # --- changes.py ---
-    change_places: int = tuned(32, "places", "tried along a covariate", "run time")
-    change_widths: tuple[float, ...] = tuned(
-        (0.015, 0.05), "-", "of the whole stretch: a wheel is on both sides of a change for a while"
-    )
-    change_waves: int = tuned(
-        12, "cosines", "of a smooth function; they fall with the square of their number, as a kink"
-    )
-    change_values: int = tuned(8, "values", "on either side of a change")
-    swept_levels: int = tuned(8, "levels", "of a covariate at least, for it to count as swept")
-    level_held: float = tuned(0.015, "-", "share of the values that makes a level")
-    change_rounds: int = tuned(6, "rounds", "of one more change", "run time")
-    run_share: float = tuned(
-        0.5, "share", "of a channel's misfit that offsets of runs take before changes are sought"
-    )
-    run_nearly: float = tuned(0.93, "share", "of that, what a few steps between runs must take")
-    few_run_steps: int = tuned(2, "steps", "between runs that are few")
-    change_worth: float = tuned(
-        0.1, "-", "of the evidence of the first part: a later change that gains less is detail"
-    )
-    change_range: Range = tuned((0.01, 0.99), "quantile", "of a covariate, where changes are tried")
-
-    pays: float = tuned(3.0, "nats", "a change, a term of a law or a further place must gain")
-
     # --- coverage.py, learnt.py ---
     beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
 
@@ -99,23 +75,16 @@ class Explain:
     law_domain: Range = tuned((0.005, 0.995), "quantile", "of a covariate: domain of a law")
 
     # --- locate.py ---
-    false_discovery: float = tuned(0.05, "probability", "false-discovery rate of the list")
-    places_listed: int = tuned(8, "places", "listed at most")
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
-    lowest_order: float = tuned(3.0, "1/turn", "lower orders belong to the wheel's angle")
-    ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
 
     # --- provenance.py ---
     same_value: float = tuned(1e-6, "-", "relative difference below which values are the same")
     same_wheel: float = tuned(0.1, "-", "of radius and width: more is another wheel, no correction")
 
     # --- remainder.py ---
-    remainder_bends: int = tuned(2, "powers", "of a covariate that describe a remainder")
     remainder_share: float = tuned(
         0.2, "share", "of a remainder's squares that a covariate must take to be named"
     )
-    remainder_parts: int = tuned(3, "parts", "of a covariate's range that are distinguished")
-    remainder_values: int = tuned(10, "values", "needed")
     remainder_noise: float = tuned(0.5, "σ", "of the noise: a smaller remainder is within it")
 
     # --- traces.py ---
@@ -126,20 +95,9 @@ class Explain:
     one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that count as one")
 
     # --- wording.py ---
-    reads_nothing: float = tuned(1e-3, "-", "of the largest of several values: less reads 0")
-    more_digits: int = tuned(3, "digits", "at most, that distinguish values")
-    long_place: float = tuned(10.0, "m or s", "from which on a place has a digit more")
-    equal_places: int = tuned(12, "decimals", "to which two contrasts are equal", "rounding")
-    low_end: Range = tuned((0.0, 0.15), "choice", "quantiles between which a mean is taken")
-    middle: Range = tuned((0.4, 0.6), "choice", "quantiles between which a mean is taken")
-    high_end: Range = tuned((0.85, 1.0), "choice", "quantiles between which a mean is taken")
-    middle_stands_out: float = tuned(
-        0.25, "-", "of the difference between the ends: a middle that far outside is reported"
-    )
+    parts: int = tuned(5, "parts", "of a covariate's values: the outer two and the middle are told")
     means_alike: float = tuned(0.15, "-", "of a mean: two that are closer are called the same")
-    runs_named: int = tuned(6, "runs", "that are all named; of more only the farthest off")
-    runs_far_named: int = tuned(3, "runs", "farthest off that are named of many")
-    runs_show: float = tuned(0.6, "share", "of the squares of the runs' means that changes take")
+    runs_named: int = tuned(4, "runs", "farthest off that are named")
 
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")

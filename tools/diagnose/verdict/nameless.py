@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
+from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.noise.colour import whiten
-from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
@@ -72,27 +69,8 @@ def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]
     functions = screening.shapes(model)
     if not functions:
         return [], 0.0
-    projection = without_harmonics(screening.problem, model.fitted)
-    columns = np.column_stack([s.columns for s in functions])
-    a, b = projection.project(whiten(screening.problem.noise, columns))
-    ends = np.cumsum([0, *(s.columns.shape[1] for s in functions)]).tolist()
-    parts = [np.arange(first, last) for first, last in pairwise(ends)]
-    prior = np.array([s.prior for s in functions]) - np.log(len({s.of for s in functions}))
-
-    total, chosen = 0.0, list[int]()
-    for _ in range(TUNING.verdict.together):
-        tried = {
-            k: _together(a, b, [parts[i] for i in (*chosen, k)]) + float(prior[[*chosen, k]].sum())
-            for k in range(len(parts))
-            if k not in chosen
-        }
-        best = max(tried, key=lambda k: tried[k], default=-1)
-        if best < 0 or tried[best] <= total:
-            break
-        total, chosen = tried[best], [*chosen, best]
-    return [functions[i] for i in chosen], float(prior[chosen].sum())
-
-
-def _together(a: Array, b: Array, parts: list[Index]) -> float:
-    index = np.unique(np.concatenate(parts))
-    return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
+    beside = without_harmonics(screening.problem, model.fitted)
+    kinds = float(np.log(len({s.of for s in functions})))
+    parts = parts_of(beside, screening.problem.noise, functions, kinds)
+    taken = take_up(parts, range(len(functions)), TUNING.verdict.together).parts
+    return [functions[k] for k in taken], sum(parts.prior[k] for k in taken)

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,6 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
-from gritd.tools.diagnose.explain import changes
 from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.result import Location
 from gritd.tools.diagnose.fit.model import Model
@@ -24,7 +21,6 @@ from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
-from gritd.tools.diagnose.tuning import replaced
 from gritd.tools.proof.ours.cases import draw, record
 from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
@@ -134,18 +130,6 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
     assert locate(begun_elsewhere, held, held.fitted.predicted) == told
 
 
-def test_a_ripple_by_chance_in_one_of_many_channels_is_none() -> None:
-    """The chance of the loudest ripple is that of any channel, not that of the one it is in."""
-    drawn = plan(seconds=48.0, seed=5)
-    screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
-    channels = len(screening.problem.stack.rig.channels)
-    every = replaced("explain", least_share=0.0, places_listed=99)
-    with every, replaced("screen", level=1.0):
-        told = [p for p in locate(screening, screening.base) if p.covariate == "wheel_angle"]
-    assert told
-    assert [p.q for p in told] == [pytest.approx(min(p.p * channels, 1.0)) for p in told]
-
-
 @pytest.mark.slow
 def test_noise_alone_has_no_change_points() -> None:
     """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a
@@ -156,17 +140,5 @@ def test_noise_alone_has_no_change_points() -> None:
     for seed in range(40):
         drawn = draw(settings, np.random.default_rng(seed))
         screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
-        alarms += bool(changes.find_changes(screening, screening.base))
+        alarms += any(place.changes for place in locate(screening, screening.base))
     assert alarms <= 2
-
-
-def test_a_covariate_with_no_place_for_a_step_is_left_out() -> None:
-    """All but a few values at the start of the bed: whatever the place, too few lie beyond it."""
-    position = np.concatenate([np.linspace(0.0, 1e-3, 400), np.linspace(0.01, 1.0, 6)])
-    run = SimpleNamespace(time=np.arange(position.size), covariates={"position": position})
-    stack: Any = SimpleNamespace(
-        rig=SimpleNamespace(runs=[run]), run=np.zeros(position.size, dtype=int), time=run.time,
-        covariate=lambda name: run.covariates[name],
-    )  # fmt: skip
-    everything = np.ones(position.size, dtype=bool)
-    assert all(places.size for _, places, _ in changes._steps(stack, everything, everything))

@@ -43,16 +43,11 @@ def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None
     gains = {key: _told_apart(search, rivals, key) for key in rig.menu.driven} | _measured(
         rig, rivals
     )
-    settled = {
-        key: sum(gain >= TUNING.explain.gain_enough for gain in each) for key, each in gains.items()
-    }
+    settled = {key: sum(gain >= TUNING.screen.sure for gain in each) for key, each in gains.items()}
 
     key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
-    told = [
-        m
-        for m, gain in zip(rivals[1:], gains[key], strict=True)
-        if gain >= TUNING.explain.gain_worth
-    ]
+    least = min(TUNING.screen.sure, max(gains[key]))
+    told = [m for m, gain in zip(rivals[1:], gains[key], strict=True) if gain >= least > 0.0]
 
     names = tuple(
         dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
@@ -67,7 +62,7 @@ def _most_shown(gains: Mapping[str, Mapping[str, float]]) -> NextExperiment | No
     key = max(median, key=lambda k: median[k], default="")
     if not key or median[key] <= 0.0:
         return None
-    shown = [n for n, gain in gains[key].items() if gain >= TUNING.explain.gain_worth]
+    shown = [n for n, gain in gains[key].items() if gain >= min(TUNING.screen.sure, median[key])]
     return _foretold(key, median[key], tuple(shown))
 
 
@@ -231,14 +226,14 @@ def _slopes(
     """Change of what is foreseen (values, q) for one σ of each soil constant as fitted so far."""
     rig = search.problem.stack.rig
     sigma = search.base.fitted.sigma
-    slopes = []
+    slopes, step = [], TUNING.fit.derivative_steps[1]
 
     for i, constant in enumerate(rig.constants):
         if constant.soil:
             moved = u.copy()
-            moved[i] += TUNING.explain.foreseen_step
+            moved[i] += step
             change = _values(rig.foresee(key, moved, effects)) - _values(here)
-            slopes.append(change / TUNING.explain.foreseen_step * sigma[i])
+            slopes.append(change / step * sigma[i])
     return np.column_stack(slopes)
 
 

@@ -154,8 +154,9 @@ def _with_terms(start: Start, free: tuple[Free, ...], form: LawForm, domain: Dom
 
 def _domain(stack: Stack, form: LawForm) -> Domain:
     """Of each covariate the range that was driven, in the effect's units."""
+    beyond = TUNING.explain.learnt_beyond
     ranges = {
-        n: np.quantile(stack.covariate(n), TUNING.explain.law_domain) / unit
+        n: np.quantile(stack.covariate(n), (beyond, 1.0 - beyond)) / unit
         for n, unit in form.domain.items()
     }
     return {n: (float(v[0]), float(v[1])) for n, v in ranges.items()}

@@ -24,6 +24,7 @@ from gritd.estimator.model.correction import LEFT_OUT, root_of
 from gritd.estimator.model.discrepancy import Usual, covariance, features_of
 from gritd.estimator.model.learnt import CHANNELS, ChannelForm, Domain, LearntForm, LearntSoil
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.wording import magnitude
 from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
@@ -32,6 +33,7 @@ from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import HAD, Bools, FormSource, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 WHEN = ("delay", "blur")  # kinds of constants that move a channel in time
 
@@ -277,25 +279,22 @@ def _domain(stack: Stack, sources: list[FormSource]) -> Domain:
 
     forward, backward = bool(np.any(direction > 0.0)), bool(np.any(direction < 0.0))
     return Domain(
-        _ends(slip, TUNING.explain.learnt_end_places, -1.0, 1.0),  # farther no condition goes
-        _above_zero(load, TUNING.explain.learnt_end_places),
-        _above_zero(speed, TUNING.explain.learnt_speed_places),
+        _ends(slip, -1.0, 1.0),  # farther no condition goes
+        _ends(load),
+        _ends(speed),
         "both" if forward and backward else "forward" if forward else "backward",
     )
 
 
-def _above_zero(values: Array, places: int) -> tuple[float, float]:
-    """The range of positive values: no less than what so many decimals show."""
-    return _ends(values, places, 10.0**-places)
-
-
-def _ends(values: Array, places: int, least: float, most: float = np.inf) -> tuple[float, float]:
-    """The range of values, a few hundredths wider, outwards to so many decimals; from least to
-    most.
+def _ends(values: Array, least: float | None = None, most: float = np.inf) -> tuple[float, float]:
+    """The range of values, a few hundredths wider, outwards to a hundredth of the larger end's
+    first digit; from least, if not given what is so shown, to most.
     """
     beyond = TUNING.explain.learnt_beyond
     low, high = (float(np.quantile(values, q)) for q in (beyond, 1.0 - beyond))
-    margin, unit = TUNING.explain.beyond * max(abs(low), abs(high)), 10.0**-places
-    low, high = low - margin, high + margin
-    ends = np.clip((np.floor(low / unit) * unit, np.ceil(high / unit) * unit), least, most)
-    return round(float(ends[0]), places), round(float(ends[1]), places)
+    largest = max(abs(low), abs(high), SPAN)
+    margin, places = TUNING.explain.beyond * largest, 2 - magnitude(largest)
+    unit = 10.0**-places
+    ends = (np.floor((low - margin) / unit) * unit, np.ceil((high + margin) / unit) * unit)
+    first, last = np.clip(ends, unit if least is None else least, most).tolist()
+    return round(first, places), round(last, places)

@@ -17,6 +17,7 @@ from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 WHEEL = "wheel."  # begins the keys of what no calibration mends
 
@@ -38,7 +39,7 @@ def check_rig(recordings: Sequence[Recording], settings: Settings, source: str) 
 def _other_rig(recorded: Settings, settings: Settings) -> str:
     """What tells two testbeds apart; '' where nothing does."""
     named = recorded.testbed != settings.testbed
-    limit = TUNING.explain.same_value if named else TUNING.explain.same_wheel
+    limit = SLIGHT if named else TUNING.explain.same_wheel
     differing = [text for text in _differences(recorded, settings, limit) if named or WHEEL in text]
     name = [f"testbed {recorded.testbed!r} (configuration: {settings.testbed!r})"] if named else []
     return ", ".join([*name, *differing]) if differing else ""
@@ -49,7 +50,7 @@ def remarks(recordings: Sequence[Recording], settings: Settings) -> list[str]:
     shared: dict[tuple[str, ...], list[str]] = {}
     for recording in recordings:
         recorded = _recorded(recording) or settings
-        if differing := tuple(_differences(recorded, settings, TUNING.explain.same_value)):
+        if differing := tuple(_differences(recorded, settings, SLIGHT)):
             shared.setdefault(differing, []).append(recording.path.name)
     return [
         f"{_listed(names)} recorded with {', '.join(differing)}."

@@ -21,7 +21,8 @@ from gritd.tools.diagnose.tuning import TUNING
 def reconciled(mean: float, sigma: float) -> tuple[float, float]:
     """Mean and σ in units of the prior σ, about the prior's mean, from those of a Gaussian fit."""
     told = 1.0 / sigma**2 - 1.0 if sigma > 0.0 else np.inf  # by the recordings: precision
-    if not TUNING.explain.told_least < told < TUNING.explain.told_most:
+    least = TUNING.explain.told_least
+    if not least < told < least**-2:
         return mean, sigma
     value, own = mean * (1.0 + told) / told, told**-0.5
 
@@ -35,10 +36,8 @@ def reconciled(mean: float, sigma: float) -> tuple[float, float]:
 
 def _points(value: float, own: float) -> Array:
     """Where the densities are summed: fine about both, out to where both have ended."""
-    near, steps = TUNING.explain.summed_near, TUNING.explain.summed_steps
-    unit = np.sinh(np.linspace(-near, near, steps))
-    wide = np.concatenate((unit, value + min(own, 1.0) * unit))
-    return np.unique(wide[np.abs(wide) < TUNING.explain.summed_far])
+    unit = np.tan(0.5 * np.pi * np.linspace(-1.0, 1.0, TUNING.explain.summed_steps)[1:-1])
+    return np.unique(np.concatenate((unit, value + min(own, 1.0) * unit)))
 
 
 def _prior(at: Array) -> Array:

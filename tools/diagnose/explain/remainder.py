@@ -47,7 +47,7 @@ def _where(stack: Stack, channel: str, functions: Sequence[Signature], left: Arr
     shares = {name: _share(s.columns[own], left[own]) for s in functions
               for name in s.shape.along if s.shape.along in ALONG}  # fmt: skip
     name = max(shares, key=lambda n: shares[n], default="")
-    if shares.get(name, 0.0) >= TUNING.explain.remainder_share:
+    if shares.get(name, 0.0) >= TUNING.explain.least_share:
         return along_covariate(stack, left, channel, name)
     mean = float(np.mean(left[own])) if own.any() else 0.0
     return f"{signed(mean, stack.rig.units[channel])} on average, uncorrelated with any covariate"

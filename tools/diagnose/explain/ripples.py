@@ -84,7 +84,7 @@ def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
 def _listed(rig: Rig, lines: Sequence[SpectralLine]) -> str:
     """The likeliest places with their channels, in words."""
     groups = _grouped(sorted(lines, key=lambda x: x.p))
-    told = [_place(rig, group) for group in groups[: TUNING.explain.shown_lines]]
+    told = [_place(rig, group) for group in groups[: TUNING.explain.shown]]
     more = len(groups) - len(told)
     return "; ".join(told) + (f"; and {more} more" if more else "")
 
@@ -96,12 +96,8 @@ def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:
 
     if first.axis == "time":
         return f"{first.at:.2f} Hz ({sizes})"
-    hertz = (
-        f"{low:.1f} to {high:.1f} Hz"
-        if high > TUNING.explain.one_frequency * low
-        else f"{low:.1f} Hz"
-    )
-    return f"{first.at:.2f} times a turn, {hertz} ({sizes})"
+    hertz = " to ".join(dict.fromkeys((f"{low:.1f}", f"{high:.1f}")))
+    return f"{first.at:.2f} times a turn, {hertz} Hz ({sizes})"
 
 
 def _order(effect: Effect) -> float | None:

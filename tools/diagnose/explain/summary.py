@@ -120,7 +120,7 @@ def _unexplained(decision: Decision) -> str:
 
 def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
     """What resembles the misfit as well as its rivals do, and why it does not explain it."""
-    bent = of.forms > TUNING.explain.bent_far
+    bent = round(of.forms, 2) > 0.0
     why = f"in a form {of.forms:.0%} off ours" if bent else "and no more of it"
     where = PLACE_OF[EFFECTS[of.name].stage]
     taken = f"takes {of.share:.0%} of the misfit, {why}: probably something else in {where}."

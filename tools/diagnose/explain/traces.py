@@ -59,7 +59,7 @@ def scatters(
 ) -> tuple[Scatter, ...]:
     stack, rig = problem.stack, problem.stack.rig
     out = []
-    for place in location[: TUNING.explain.pictures]:
+    for place in location[: TUNING.explain.shown]:
         name = place.covariate
         own = stack.of(place.channel)
         x = stack.run.astype(float) if name == "run" else stack.covariate(name)

@@ -166,13 +166,14 @@ class _Told:
 
     def everywhere(self) -> str:
         """Friction acts while the wheel turns, an offset at rest too."""
-        mean, alike = self._mean(self._own), TUNING.explain.means_alike
+        mean = self._mean(self._own)
         if not self._rest.any():
             return f"everywhere {self._say(mean)}"
         still = self._mean(self._rest)
-        if abs(still - mean) < alike * abs(mean):
+        tenths = round(10.0 * still / mean) if mean else 0
+        if tenths == 10:
             return f"at rest as while the wheel turns {self._say(mean)}"
-        known = "as the model" if abs(still) < alike * abs(mean) else _brief(self._say(still))
+        known = _brief(self._say(still)) if tenths else "as the model"
         return f"while the wheel turns {self._say(mean)}, at rest {known}"
 
     def along(self, covariate: str) -> str:
@@ -234,10 +235,10 @@ class _Told:
             name: self._mean(self._own & (number_of == n)) for n, name in self._names().items()
         }
         levels = np.array(list(means.values()))
-        if levels.size > 1 and np.ptp(levels) < TUNING.explain.means_alike * np.abs(levels).min():
+        if levels.size > 1 and round(10.0 * np.ptp(levels) / np.abs(levels).max()) == 0:
             return f"in all runs {self._say(float(levels.mean()))}"
 
-        far = sorted(means, key=lambda name: -abs(means[name]))[: TUNING.explain.runs_named]
+        far = sorted(means, key=lambda name: -abs(means[name]))[: TUNING.explain.shown]
         each = [f"{_brief(self._say(means[name]))} in {name}" for name in means if name in far]
         most = "from run to run" if len(far) == len(means) else "most"
         return f"{most}: {listed(each)} than the model"

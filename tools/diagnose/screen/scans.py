@@ -142,11 +142,11 @@ def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[F
 
 def more_families(stack: Stack, noise: Noise) -> tuple[Family, ...]:
     """Where else a misfit may live: ripples of the wheel, steps along slip and between runs."""
-    searched = []
+    searched, known = [], stack.rig.runs[0].covariates
     for channel in stack.rig.channels:
         turning = orders_shown(stack, 1.0) / (2.0 * np.pi)
         searched.append(waves(stack, noise, channel, "wheel_angle", turning, stack.new))
-        for axis in ("slip", "run"):
+        for axis in ("slip", "run") if "slip" in known else ("run",):
             at = places(stack, channel, axis)
             searched.append(steps(stack, noise, channel, axis, at, stack.new))
 

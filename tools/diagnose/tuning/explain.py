@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from gritd.tools.diagnose.tuning.field import tuned
 
-Range = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Explain:
@@ -30,9 +28,6 @@ class Explain:
     held_out_worse: float = tuned(
         0.1, "share", "by which the held-out error of a channel grows: an explanation in part"
     )
-    bent_far: float = tuned(
-        0.3, "share", "by which our form is off: more is reported as resembling"
-    )
 
     # --- experiment.py ---
     instrument: float = tuned(
@@ -42,13 +37,10 @@ class Explain:
         0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
     )
     foreseen_together: int = tuned(10, "values", "that count as one: neighbours share their noise")
-    gain_enough: float = tuned(10.0, "nats", "decide")
     rivals: int = tuned(4, "explanations", "that an experiment is to distinguish", "run time")
-    gain_worth: float = tuned(1.0, "nats", "from which on two are called distinguished")
-    foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
 
     # --- explanation.py ---
-    shown_lines: int = tuned(4, "places", "of ripples and of vibrations that a note tells")
+    shown: int = tuned(4, "lines, runs, or scatters", "that are told or drawn of many")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
     slight_explanation: float = tuned(
         1e-2, "probability", "below which an explanation does not count for the soil"
@@ -63,41 +55,27 @@ class Explain:
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
     )
     told_least: float = tuned(1e-4, "-", "precision in the prior's: less says nothing of the soil")
-    told_most: float = tuned(1e8, "-", "precision in the prior's: more is no measurement")
-    summed_near: float = tuned(5.0, "-", "arsinh of the farthest point about a value", "run time")
     summed_steps: int = tuned(801, "points", "about each of the two", "run time")
-    summed_far: float = tuned(40.0, "σ", "of the prior: farther is no soil")
 
     # --- law.py ---
     law_carries: float = tuned(
         0.9, "share", "of the misfit that a law must take to be written in place of δ"
     )
-    law_domain: Range = tuned((0.005, 0.995), "quantile", "of a covariate: domain of a law")
 
     # --- locate.py ---
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
 
     # --- provenance.py ---
-    same_value: float = tuned(1e-6, "-", "relative difference below which values are the same")
     same_wheel: float = tuned(0.1, "-", "of radius and width: more is another wheel, no correction")
 
     # --- remainder.py ---
-    remainder_share: float = tuned(
-        0.2, "share", "of a remainder's squares that a covariate must take to be named"
-    )
     remainder_noise: float = tuned(0.5, "σ", "of the noise: a smaller remainder is within it")
 
     # --- traces.py ---
-    pictures: int = tuned(4, "scatters", "at most")
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
-
-    # --- ripples.py ---
-    one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that count as one")
 
     # --- wording.py ---
     parts: int = tuned(5, "parts", "of a covariate's values: the outer two and the middle are told")
-    means_alike: float = tuned(0.15, "-", "of a mean: two that are closer are called the same")
-    runs_named: int = tuned(4, "runs", "farthest off that are named")
 
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")
@@ -105,8 +83,6 @@ class Explain:
     learnt_places: int = tuned(
         4, "decimals", "of means; directions and correlations have one less, points two"
     )
-    learnt_end_places: int = tuned(2, "decimals", "of the domain's ends of slip and load")
-    learnt_speed_places: int = tuned(5, "decimals", "of the domain's ends of rim speed [m/s]")
     learnt_left_out: float = tuned(
         1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
     )

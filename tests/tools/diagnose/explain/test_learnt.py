@@ -35,7 +35,7 @@ def test_the_domain_stays_where_conditions_are() -> None:
     assert _ends(np.array([0.1, 1.0]), -1.0, 1.0)[1] == 1.0
     assert _ends(np.array([-1.0, 0.3]), -1.0, 1.0)[0] == -1.0
     assert _ends(np.array([0.1, 0.6]), -1.0, 1.0) == pytest.approx((0.08, 0.62), abs=0.011)
-    assert _ends(np.array([0.001, 0.1]))[0] == 1e-3
+    assert _ends(np.array([0.001, 0.1]))[0] == 1e-4
     assert _ends(np.array([20.0, 100.0]))[0] == pytest.approx(18.0, abs=0.5)
 
 

@@ -64,7 +64,7 @@ def explain(
         location = located()
 
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
-    left, fit = remainders(search.screening, accepted), _fit(problem, before, after)
+    left, fit = remainders(problem, accepted), _fit(problem, before, after)
     return Diagnosis(
         verdict=decision.verdict,
         summary=summary(decision, location, fit, search.first, rig, strains(rig, base)),

@@ -11,10 +11,10 @@ from gritd.tools.cli.wording import shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import Discrepancy, Remainder
 from gritd.tools.diagnose.explain.wording import along_covariate, signed
 from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
 
@@ -22,19 +22,19 @@ WITHIN = "within the noise"
 ALONG = [(name,) for name in ("slip", "load", "speed", "position", "time", "wheel_angle")]
 
 
-def remainders(screening: Screening, model: Model) -> Mapping[str, Remainder]:
+def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
     """Of each channel: what the model predicts without its discrepancies, against the recording,
     beyond the noise.
     """
-    problem, told = screening.problem, {}
-    stack, rig = problem.stack, problem.stack.rig
+    stack, rig, told = problem.stack, problem.stack.rig, {}
+    every = smooth_signatures(stack, everywhere=True)
     left = stack.measured - model.fitted.predicted
 
     for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
         squares = float(np.mean(left[stack.of(channel)] ** 2)) - colour.sigma**2
         size = float(np.sqrt(max(squares, 0.0)))
         near = size <= TUNING.explain.remainder_noise * colour.sigma
-        functions = [s for s in screening.functions if s.shape.channel == channel]
+        functions = [s for s in every if s.shape.channel == channel]
         where = WITHIN if near else _where(stack, channel, functions, left)
         told[channel] = Remainder(size, rig.units[channel], where)
 

@@ -40,7 +40,7 @@ class Explain:
     rivals: int = tuned(4, "explanations", "that an experiment is to distinguish", "run time")
 
     # --- explanation.py ---
-    shown: int = tuned(4, "lines, runs, or scatters", "that are told or drawn of many")
+    shown: int = tuned(4, "lines, runs, or scatters", "that are shown of many")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
     slight_explanation: float = tuned(
         1e-2, "probability", "below which an explanation does not count for the soil"
@@ -75,7 +75,7 @@ class Explain:
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
 
     # --- wording.py ---
-    parts: int = tuned(5, "parts", "of a covariate's values: the outer two and the middle are told")
+    parts: int = tuned(5, "parts", "of a covariate's values: the outer two and the middle shown")
 
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")

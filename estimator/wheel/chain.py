@@ -113,13 +113,15 @@ class Chain:
             snapshot.axle_torque.value,
         )
 
-        situation = replace(situation, carried=load)
         true = corrected(read, situation, self.effects)
         carried = self._carried(float(true.load), situation)
         situation = replace(situation, current=true.current, carried=carried, sinkage=true.sinkage)
         torque = self._torque(true, situation)
-        situation = self._placed(
-            replace(situation, torque=torque, drawbar_pull=true.drawbar_pull), wheel
+        situation = replace(
+            situation,
+            torque=torque,
+            drawbar_pull=true.drawbar_pull,
+            theta_1=entry_angle(wheel.radius, float(true.sinkage)).value,
         )
 
         felt = react(situation, self.effects)
@@ -205,14 +207,10 @@ class Chain:
             cohesion=context.c,
             tan_phi=context.tan_phi,
             shear_modulus=context.k,
+            carried=load,
         )
 
         return wheel, situation
-
-    @staticmethod
-    def _placed(situation: Situation, wheel: Wheel) -> Situation:
-        """With θ₁ of the corrected sinkage."""
-        return replace(situation, theta_1=entry_angle(wheel.radius, float(situation.sinkage)).value)
 
     def _here(self, situation: Situation, context: Context) -> Here:
         """Slope and offset of each soil parameter through the soil and contact effects."""

@@ -7,7 +7,6 @@ raises stands in.
 
 from __future__ import annotations
 
-import os
 import random
 import socket
 import time
@@ -23,65 +22,21 @@ from gritd.drivers.errors import DeviceError
 from gritd.drivers.framing_can import CanFraming
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.wire import CanWire
+from tests.drivers.can_bus import Bus, all_channels
 from tests.drivers.rig import (
-    CAN_SIGNALS,
-    Plug,
     Ticking,
     can_device,
-    channel,
     wait_until,
     wiring,
-    wrench,
 )
 
 GROUP = "239.74.163.77"
-LIMITS = {"sinkage_pot": (0.0, 5.0), "motor_shunt": (0.0, 5.0)}
-
-
-def all_channels(device="bus"):
-    return [
-        channel(name, device, signal, *LIMITS.get(name, (-1e12, 1e12)))
-        for name, signal in CAN_SIGNALS.items()
-    ]
 
 
 def free_port() -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
-
-
-class Bus:
-    """A reader on a bus, and the sending end."""
-
-    def __init__(self, device, sender) -> None:
-        self.wire = CanWire(device)
-        self.sender = sender
-        self.queue = ReadingQueue(1 << 20)
-        settings = wiring([device], all_channels(), wrench("bus", "WrenchForce+WrenchTorque"))
-        (self.reader,) = build_readers(settings, Ticking(), self.queue)
-        self.reader.start()
-        assert wait_until(lambda: self.reader.stats().state == "OPEN")
-
-    def send(self, key, values, device_us=None):
-        self.sender(self.wire.encode(key, values, device_us))
-
-    def receive(self, count):
-        got = []
-        assert wait_until(
-            lambda: len(got) >= count or got.extend(self.queue.drain()) or len(got) >= count
-        )
-        return got
-
-    def one_of_each(self, n):
-        device_us = 4000 * n
-        self.send("WheelEncoder.Count", [100 * n % (1 << 32)], device_us)
-        self.send("CarriageEncoder.Count", [-7 * n % (1 << 32)], device_us)
-        self.send("SinkagePot.Volts", [1.5], device_us)
-        self.send("MotorShunt.Volts", [2.5], device_us)
-        self.send("MotorTemperature.Celsius", [25.5], device_us)
-        self.send("WrenchForce", [1.0, 2.0, 3.0])
-        self.send("WrenchTorque", [0.5, 0.25, -0.5])
 
 
 @pytest.fixture
@@ -256,67 +211,6 @@ def test_hostile_datagrams_are_counted_and_ignored(multicast, count):
     assert stats.bad > count / 3
 
 
-# ---- slcan ---------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def slcan(tmp_path):
-    plug = Plug(tmp_path / "slcan")
-    device = can_device("slcan", str(plug.path), options={"sleep_after_open": 0.0})
-    bus = Bus(device, lambda message: plug.deliver(line(message)))
-    bus.plug = plug
-    yield bus
-    assert bus.reader.stop(2.0)
-    plug.close()
-
-
-def line(message):
-    return f"t{message.arbitration_id:03X}{message.dlc}{message.data.hex().upper()}\r".encode()
-
-
-def test_every_channel_over_slcan(slcan):
-    for n in range(3):
-        slcan.one_of_each(n)
-    got = slcan.receive(18)
-    assert [r.value for r in got if r.channel == "wheel_encoder"] == [0, 100, 200]
-    assert [r.value for r in got if r.channel == "wrench"] == [(1.0, 2.0, 3.0, 0.5, 0.25, -0.5)] * 3
-
-
-@pytest.mark.parametrize(
-    "junk",
-    [b"\xff\xfe\r", b"t1\r", b"tXYZ8\r", b"t1008AB\r", b"T\r", b"z\x07", b"t100800\xff\r", b"\r"],
-)
-def test_slcan_junk_costs_no_other_message(slcan, junk):
-    slcan.plug.deliver(junk)
-    slcan.send("WheelEncoder.Count", [5])
-    assert [r.value for r in slcan.receive(1)] == [5]
-    stats = slcan.reader.stats()
-    assert stats.state == "OPEN" and stats.reopened == 0
-
-
-def test_a_line_of_slcan_that_never_ends_is_dropped(slcan):
-    """As of a wrong baud rate."""
-    for _ in range(20):
-        slcan.plug.deliver(b"\x00" * 1000)
-        time.sleep(0.05)
-    assert wait_until(lambda: slcan.reader.stats().bad > 0)
-    assert wait_until(lambda: len(slcan.reader._link._direct[1].__self__._pending) <= 4096)
-
-
-def test_slcan_unplugged_and_back_without_losing_a_descriptor(slcan):
-    counts = []
-    for _ in range(10):
-        slcan.plug.unplug()
-        assert wait_until(lambda: slcan.reader.stats().state == "WAITING")
-        slcan.plug.plug_in()
-        assert wait_until(lambda: slcan.reader.stats().state == "OPEN")
-        slcan.send("SinkagePot.Volts", [1.0])
-        slcan.receive(1)
-        counts.append(len(os.listdir("/proc/self/fd")))
-    assert len(set(counts)) == 1
-    assert slcan.reader.stats().reopened == 10
-
-
 # ---- a failing bus -------------------------------------------------------------------------------
 
 
@@ -406,25 +300,3 @@ def test_socketcan_gets_the_filters_and_ignores_configuration_files(monkeypatch)
 def test_a_message_that_contradicts_itself_is_refused():
     with pytest.raises(ValueError, match="length"):
         packed(can.Message(arbitration_id=1, dlc=8, data=b"123"))
-
-
-@pytest.mark.parametrize("end", [b"\r", b"\r\n", b"\n"])
-def test_an_adapter_of_any_line_end_is_read_and_a_strange_sender_told(tmp_path, end):
-    """A drive of J1939 behind a serial adapter: it sends from another address, then as stated."""
-    signals = {"Drive.Count": {"id": 0x18FEF110, "start": 0, "length": 32, "extended": True}}
-    plug = Plug(tmp_path / "adapter")
-    device = can_device("slcan", str(plug.path), dbc="", signals=signals)
-    queue = ReadingQueue()
-    (reader,) = build_readers(
-        wiring([device], [channel("wheel_encoder", "bus", "Drive.Count")]), Ticking(), queue
-    )
-    reader.start()
-    assert wait_until(lambda: reader.stats().state == "OPEN")
-    plug.deliver(b"T18FEF12A8" + b"01" * 8 + end + b"nonsense" + end)
-    assert wait_until(lambda: "0x18FEF12A" in reader.stats().hint)
-    plug.deliver(b"".join(b"T18FEF1108%08X00000000" % n + end for n in range(50)))
-    assert wait_until(lambda: reader.stats().frames == 50)
-    assert reader.stats().hint == "" and reader.stats().bad == 1
-    assert reader.stop(10.0)
-    assert len(queue.drain()) == 50
-    plug.close()

@@ -17,18 +17,12 @@ from functools import lru_cache
 from pathlib import Path
 from threading import Event, Thread
 
-import numpy as np
 import yaml
 
 from gritd.config import packaged
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.yamltree import dumped
-from gritd.estimator.recording.parts import parts
-from gritd.estimator.recording.salvage import read
-from gritd.estimator.recording.topics import TOPICS
-from gritd.tools.cli.command import CommandError
-from gritd.tools.commands import replay
 from gritd.tools.service.client import connected, reports
 from gritd.tools.testbed import rig_config
 from gritd.tools.testbed.testbed import experiment, in_transit, play
@@ -375,42 +369,6 @@ def until(condition, complaint=lambda: "waited in vain", limit=LIMIT):
     while not condition():
         assert time.monotonic() < end, complaint()
         time.sleep(0.002)
-
-
-def recordings(path):
-    return [read(part, TOPICS) for part in parts(path)]
-
-
-def rows(path, topic):
-    """All messages of a topic, over all parts."""
-    return np.concatenate([recording.arrays(topic) for recording in recordings(path)])
-
-
-def log_lines(path):
-    """The texts of /log."""
-    return [
-        m[2][3] for recording in recordings(path) for m in recording.messages() if m[0] == "/log"
-    ]
-
-
-def verified(path):
-    """Whether the replay of the run is identical bit for bit."""
-    with silence():
-        try:
-            return replay.main([str(path), "--verify"]) == 0
-        except CommandError as error:
-            raise AssertionError(str(error)) from None
-
-
-@contextmanager
-def silence():
-    """Standard output into nothing."""
-    before = sys.stdout
-    with open(os.devnull, "w", encoding="utf-8") as sys.stdout:
-        try:
-            yield
-        finally:
-            sys.stdout = before
 
 
 @contextmanager

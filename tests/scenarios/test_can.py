@@ -19,7 +19,8 @@ from gritd.drivers.reader import Reader
 from gritd.estimator.config.settings import Device
 from gritd.tools.testbed.wires import has_multicast
 from tests.drivers.rig import Ticking
-from tests.scenarios.rig import TESTBED, WIRES, driven, rows, service, verified
+from tests.scenarios.recorded import rows, verified
+from tests.scenarios.rig import TESTBED, WIRES, driven, service
 
 FAILING = "CAN error frame or failing bus"
 HOSTILE = "hostile CAN or UDP datagram"

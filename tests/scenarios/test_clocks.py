@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from tests.scenarios.clocks import history, judged, with_pot
-from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, rows, service, verified
+from tests.scenarios.recorded import log_lines, rows, verified
+from tests.scenarios.rig import TESTBED, WIRES, driven, service
 
 WRONG = "one wrong stamp of a device clock"
 STEP = "step of a device clock"

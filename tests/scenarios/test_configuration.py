@@ -18,16 +18,8 @@ from gritd.estimator.config.configuration import ConfigError, load, loads, reloa
 from gritd.estimator.config.yamltree import dumped
 from gritd.tools.cli.configuration_file import edited, save
 from tests.estimator.config.rig import HOSTILE
-from tests.scenarios.rig import (
-    TESTBED,
-    WIRES,
-    driven,
-    log_lines,
-    recordings,
-    rows,
-    service,
-    verified,
-)
+from tests.scenarios.recorded import log_lines, recordings, rows, verified
+from tests.scenarios.rig import TESTBED, WIRES, driven, service
 
 BAD_RELOAD = "SIGHUP with bad YAML"
 CUT = "YAML cut at every byte"

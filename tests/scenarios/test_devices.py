@@ -13,7 +13,8 @@ import pytest
 
 from gritd.estimator.messages.status import CHANNEL_BITS, Status
 from tests.drivers.rig import damage
-from tests.scenarios.rig import ROOT, WIRES, driven, rows, service, verified
+from tests.scenarios.recorded import rows, verified
+from tests.scenarios.rig import ROOT, WIRES, driven, service
 
 ENCODERS = CHANNEL_BITS["wheel_encoder"] | CHANNEL_BITS["carriage_encoder"]
 UNPLUGGED = "device unplugged and back"

@@ -17,18 +17,8 @@ import pytest
 from gritd.estimator.recording.parts import part_path
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import CHECKPOINT
-from tests.scenarios.rig import (
-    ROOT,
-    WIRES,
-    DaemonProcess,
-    Wires,
-    driven,
-    log_lines,
-    recordings,
-    rows,
-    service,
-    verified,
-)
+from tests.scenarios.recorded import log_lines, recordings, rows, verified
+from tests.scenarios.rig import ROOT, WIRES, DaemonProcess, Wires, driven, service
 from tests.scenarios.users import as_root, hand_over
 
 FULL = "disk full"

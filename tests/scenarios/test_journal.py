@@ -18,7 +18,8 @@ import pytest
 import yaml
 
 from gritd.tools.service.incidents import OVER
-from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, service
+from tests.scenarios.recorded import log_lines
+from tests.scenarios.rig import TESTBED, WIRES, driven, service
 
 SAID = "silence, garbage, counter jumps, a stopped process"
 MANY = 12  # lines for one fault, both ends included, whatever else they bring about

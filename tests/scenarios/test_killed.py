@@ -17,14 +17,8 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
 from tests.scenarios import killed_writer
-from tests.scenarios.rig import (
-    ROOT,
-    WIRES,
-    driven,
-    rows,
-    service,
-    verified,
-)
+from tests.scenarios.recorded import rows, verified
+from tests.scenarios.rig import ROOT, WIRES, driven, service
 
 KILLED = "kill -9 while logging"
 POWER = "power cut while logging"

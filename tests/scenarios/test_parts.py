@@ -14,7 +14,8 @@ import pytest
 
 from gritd.estimator.recording.parts import parts
 from tests.scenarios.commands import in_process
-from tests.scenarios.rig import ROOT, WIRES, driven, recordings, rows, service, verified
+from tests.scenarios.recorded import recordings, rows, verified
+from tests.scenarios.rig import ROOT, WIRES, driven, service
 
 FAILED = "write error in the middle of a part"
 AGAIN = "recovery of the log"

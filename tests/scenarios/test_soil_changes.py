@@ -12,7 +12,8 @@ from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.status import UPDATED, Flag, Status
 from gritd.tools.commands.status import summary
 from gritd.tools.dev import soil_changes as changes
-from tests.scenarios.rig import WIRES, driven, log_lines, service, verified
+from tests.scenarios.recorded import log_lines, verified
+from tests.scenarios.rig import WIRES, driven, service
 
 QUICK = True
 CHANGES = "step, ramp or patch of the soil"

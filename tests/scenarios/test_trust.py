@@ -21,16 +21,8 @@ from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.topics import TOPICS
 from tests.scenarios.commands import AS_PROCESSES
-from tests.scenarios.rig import (
-    ROOT,
-    TESTBED,
-    WIRES,
-    DaemonProcess,
-    Wires,
-    driven,
-    log_lines,
-    until,
-)
+from tests.scenarios.recorded import log_lines
+from tests.scenarios.rig import ROOT, TESTBED, WIRES, DaemonProcess, Wires, driven, until
 
 QUICK = True
 ESCAPES = "terminal escapes in names"

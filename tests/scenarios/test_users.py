@@ -20,17 +20,8 @@ from gritd.estimator.daemon.publish import MAX_CLIENTS
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
 from gritd.tools.service.client import connected, reports
-from tests.scenarios.rig import (
-    LIMIT,
-    ROOT,
-    WIRES,
-    DaemonProcess,
-    Wires,
-    driven,
-    rows,
-    service,
-    verified,
-)
+from tests.scenarios.recorded import rows, verified
+from tests.scenarios.rig import LIMIT, ROOT, WIRES, DaemonProcess, Wires, driven, service
 from tests.scenarios.users import as_root, hand_over
 
 SOCKET = "second daemon on a socket, too many readers"

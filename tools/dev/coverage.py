@@ -46,7 +46,7 @@ UNTRACED = (
         f"tests/scenarios/test_{name}.py"
         for name in (
             *("bed", "can", "clocks", "configuration", "journal"),
-            *("limits", "loop", "memory", "soil_changes", "threads", "trust"),
+            *("limits", "loop", "memory", "soil_changes", "starvation", "threads", "trust"),
         )
     ),
     "tests/tools/commands/test_bench.py",

@@ -11,7 +11,8 @@ import pytest
 
 from gritd.estimator.messages.readings import CHANNELS
 from gritd.estimator.recording.salvage import read
-from tests.scenarios.rig import ROOT, DaemonProcess, Wires, driven, verified
+from tests.scenarios.recorded import verified
+from tests.scenarios.rig import ROOT, DaemonProcess, Wires, driven
 
 pytestmark = pytest.mark.long
 

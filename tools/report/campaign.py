@@ -96,7 +96,7 @@ def _summary(campaign: ReportedCampaign) -> str:
 
 def _differences(campaign: ReportedCampaign) -> str:
     """Of both forms from what was measured, over the windows of all runs."""
-    every = [run.beside for run in campaign.runs if run.beside is not None]
+    every = [run.windows for run in campaign.runs if run.windows is not None]
     if not every:
         return ""
     of = joined(every)
@@ -114,7 +114,7 @@ def _differences(campaign: ReportedCampaign) -> str:
 
 
 def _forces(campaign: ReportedCampaign) -> Markup | None:
-    of = [run for run in campaign.runs if run.beside is not None]
+    of = [run for run in campaign.runs if run.windows is not None]
     if not of:
         return None
     note = (
@@ -130,8 +130,8 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
     parts = [
         (f"{run.name}, {np.mean(part.load):.0f} N", part)
         for run in of
-        if run.beside is not None
-        for part in run.beside.by_load()
+        if run.windows is not None
+        for part in run.windows.by_load()
     ]
 
     for channel, (label, unit) in FORCES.items():
@@ -348,7 +348,7 @@ def _channels(runs: Sequence[LabRun]) -> list[list[str]]:
 
 
 def _tracked(run: LabRun) -> float:
-    return 0.0 if run.beside is None else len(run.beside.slip) / max(len(run.rows), 1)
+    return 0.0 if run.windows is None else len(run.windows.slip) / max(len(run.rows), 1)
 
 
 def _lateness(run: LabRun) -> str:

@@ -71,8 +71,8 @@ def _along_time(ax: Axes, ticks: Rows, seconds: Array, field: str, truth: float)
     ax.set_ylim(stated - 1.1 * spread, stated + 1.35 * spread)
     ax.set_xlim(seconds[0], seconds[-1])
     ax.set_xlabel("time [s]")
-    beside = ax.get_yaxis_transform()  # share of the axes, value
-    words: Any = {"transform": beside, "fontsize": 7.5, "ha": "right", "va": "center"}
+    by_share = ax.get_yaxis_transform()  # share of the axes, value
+    words: Any = {"transform": by_share, "fontsize": 7.5, "ha": "right", "va": "center"}
     side = 1.0 if truth > stated else -1.0
     ax.text(0.98, stated - 0.9 * side * spread, "stated before", color=SOFT, **words)
     ax.text(0.98, truth + 0.22 * side * spread, "truth", color=INK, **words)

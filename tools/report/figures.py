@@ -58,9 +58,9 @@ def panels(items: Iterable[Child]) -> Markup:
     return tag("div", *items, class_="panels")
 
 
-def panel(title: str, drawing: Markup, beside: str = "") -> Markup:
-    """`beside` is never cut, a long title is."""
-    head = tag("p", tag("b", title, title=title), tag("span", beside), class_="panel-title")
+def panel(title: str, drawing: Markup, note: str = "") -> Markup:
+    """`note` is never cut, a long title is."""
+    head = tag("p", tag("b", title, title=title), tag("span", note), class_="panel-title")
     return tag("div", head, drawing, class_="panel")
 
 
@@ -120,7 +120,7 @@ def channels(of: Sequence[Trace]) -> Markup:
 
 
 def trace_panel(trace: Trace, title: str = "") -> Markup:
-    """Under its run's name, or another title, beside its error."""
+    """Under its run's name, or another title, with its error."""
     unit, factor = shown(trace.unit)
     error = number(rms(trace, "before") * factor, 2)
     if differs(trace):

@@ -24,7 +24,7 @@ KEY = "dots: measured, lines: original equations, dashed: closed form"
 
 def draw(path: Path, campaign: ReportedCampaign) -> None:
     """As PNG or SVG. Raises OSError, and ValueError where the filter was never updated."""
-    every = [run.beside for run in campaign.runs if run.beside is not None]
+    every = [run.windows for run in campaign.runs if run.windows is not None]
     if not every:
         raise ValueError("found no window at which the filter was updated")
     loads = joined(every).by_load()

@@ -20,9 +20,9 @@ EQUAL = 0.5  # of the largest probability: so much of it is as probable, in a gr
 
 def introduction(diagnosis: Diagnosis) -> str:
     tried = counted(len(diagnosis.hypotheses), "effect")
-    beside = "the soil" if diagnosis.soil else "what is known of the rig"
+    floating = "the soil" if diagnosis.soil else "what is known of the rig"
     return (
-        f"{tried} considered together with {beside} in all channels, "
+        f"{tried} considered together with {floating} in all channels, "
         "scored on runs and conditions not fitted to. "
         "A probability is the share of an effect among all that was weighed: each effect alone, "
         "sets of them, no effect at all, and something that is not in the list. "

@@ -103,7 +103,7 @@ class LabRun:
     run: BedRun
     summary: RunSummary
     sha256: str
-    beside: MeasuredWindows | None  # None where the filter was never updated
+    windows: MeasuredWindows | None  # None where the filter was never updated
 
     @property
     def name(self) -> str:
@@ -119,7 +119,7 @@ def lab_runs(runs: Sequence[BedRun]) -> list[LabRun]:
     """The runs of a bed, their equations at what all of them know of its soil."""
     final = runs[-1].known.estimate
     return [
-        LabRun(run, summary([run.recording]), sha256(run.recording), beside(run, final))
+        LabRun(run, summary([run.recording]), sha256(run.recording), measured_windows(run, final))
         for run in runs
     ]
 
@@ -133,7 +133,7 @@ def sha256(recording: Recording) -> str:
     return digest.hexdigest()
 
 
-def beside(run: BedRun, estimate: Estimate) -> MeasuredWindows | None:
+def measured_windows(run: BedRun, estimate: Estimate) -> MeasuredWindows | None:
     """Both forms of the equations at the windows of a run, at an estimate of the soil, with the
     effects and the discrepancy of the configuration: what `gritd diagnose` simulates, at the
     measured entry angle. None where the filter was never updated.
@@ -211,7 +211,7 @@ def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
             run.name,
             _date(run.summary.start),
             loads_of(run),
-            _slips(run.beside),
+            _slips(run.windows),
             fixed(run.summary.duration, 1),
             run.sha256[:12],
         ]
@@ -221,9 +221,9 @@ def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
 
 def loads_of(run: LabRun) -> str:
     """The load [N] that is stated of a run; else those that were measured."""
-    if run.run.recording.run.nominal_load is not None or run.beside is None:
+    if run.run.recording.run.nominal_load is not None or run.windows is None:
         return f"{run.run.settings.load.nominal.value:g}"
-    return ", ".join(fixed(float(np.mean(part.load)), 0) for part in run.beside.by_load())
+    return ", ".join(fixed(float(np.mean(part.load)), 0) for part in run.windows.by_load())
 
 
 def _date(stamp: int) -> str:

@@ -35,7 +35,7 @@ def _run(run: LabRun) -> dict[str, Any]:
         "reason": str(reason),
         "alone": _soil(of.alone.estimate),
         "together": _soil(of.known.estimate),
-        "loads": [_load(part) for part in run.beside.by_load()] if run.beside else [],
+        "loads": [_load(part) for part in run.windows.by_load()] if run.windows else [],
     }
 
 

@@ -99,10 +99,10 @@ def _recorded(path: Path, name: str, digest: str) -> Path:
     """A recording that a diagnosis names: as it is, or in the folder of its JSON. Raises
     CommandError where it is missing, or another one by its SHA-256.
     """
-    beside = path.parent / Path(name).name
-    recording = Path(name) if Path(name).exists() else beside
+    next_to_it = path.parent / Path(name).name
+    recording = Path(name) if Path(name).exists() else next_to_it
     if not recording.exists():
-        places = " nor ".join(dict.fromkeys((name, str(beside))))
+        places = " nor ".join(dict.fromkeys((name, str(next_to_it))))
         reason = f"found no {places}; expected a recording that it diagnosed"
         raise CommandError(f"{path}: {reason}", USAGE)
 

@@ -84,7 +84,7 @@ class Play(PlantEffect, ABC):
             return np.zeros(scene.torque.size)
         turned, step = _since_reversal(scene.motion.omega, scene.motion.step)
 
-        # of a step that is long beside the play, its mean
+        # of a step that is long against the play, its mean
         parts = [(turned - part * step) / self.strength for part in PARTS]
         share = np.mean([self.taken_up(angles) for angles in parts], axis=0)
         return np.asarray(-scene.torque * (1.0 - share) * scene.moving)

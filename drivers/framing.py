@@ -14,6 +14,8 @@ FieldValue = int | float
 
 KEY = re.compile(r"[A-Za-z0-9_.-]{1,32}")
 MAX_VALUES = 16
+SEQUENCE_MODULUS = 1 << 16
+CLOCK_MODULUS = 1 << 32  # [µs]
 
 
 class Frame(NamedTuple):
@@ -82,3 +84,27 @@ class SequenceGap:
         gap = 0 if self.expected is None else (sequence - self.expected) % self.modulus
         self.expected = (sequence + 1) % self.modulus
         return gap if gap < self.modulus // 2 else 0
+
+
+class SerialFraming:
+    """What the framings of a byte stream keep between chunks: the unfinished frame."""
+
+    hint = ""
+
+    def __init__(self) -> None:
+        self.counts = FramingCounts()
+        self._pending = b""
+        self._gap = SequenceGap(SEQUENCE_MODULUS)
+
+    @property
+    def pending(self) -> int:
+        """Bytes of the unfinished frame."""
+        return len(self._pending)
+
+    def clock_modulus(self, key: str) -> int:
+        return CLOCK_MODULUS
+
+    def reset(self) -> None:
+        self.counts.garbage += self.pending
+        self._pending = b""
+        self._gap.expected = None

@@ -12,10 +12,16 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 
-from gritd.drivers.framing import KEY, MAX_VALUES, FieldValue, Frame, FramingCounts, SequenceGap
+from gritd.drivers.framing import (
+    CLOCK_MODULUS,
+    KEY,
+    MAX_VALUES,
+    SEQUENCE_MODULUS,
+    FieldValue,
+    Frame,
+    SerialFraming,
+)
 
-SEQUENCE_MODULUS = 1 << 16
-CLOCK_MODULUS = 1 << 32  # [µs]
 MAX_LINE = 512  # [bytes] from `$` to the line's end
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,19}")
@@ -33,28 +39,8 @@ def encode(frame: Frame) -> bytes:
     return b"$%b*%04X\r\n" % (body, crc_hqx(body, 0xFFFF))
 
 
-class AsciiFraming:
+class AsciiFraming(SerialFraming):
     """Incremental decoder of checksummed lines; keeps at most MAX_LINE bytes between chunks."""
-
-    hint = ""
-
-    def __init__(self) -> None:
-        self.counts = FramingCounts()
-        self._pending = b""
-        self._gap = SequenceGap(SEQUENCE_MODULUS)
-
-    @property
-    def pending(self) -> int:
-        """Bytes of the unfinished line."""
-        return len(self._pending)
-
-    def clock_modulus(self, key: str) -> int:
-        return CLOCK_MODULUS
-
-    def reset(self) -> None:
-        self.counts.garbage += self.pending
-        self._pending = b""
-        self._gap.expected = None
 
     def decode(self, chunk: bytes) -> list[Frame]:
         head, *lines = (self._pending + chunk).split(b"$")

@@ -19,10 +19,8 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 
-from gritd.drivers.framing import KEY, MAX_VALUES, Frame, FramingCounts, SequenceGap
+from gritd.drivers.framing import KEY, MAX_VALUES, Frame, SerialFraming
 
-SEQUENCE_MODULUS = 1 << 16
-CLOCK_MODULUS = 1 << 32  # [µs]
 MAX_BODY = 253
 MAX_STUFFED = MAX_BODY + 1
 
@@ -80,32 +78,18 @@ def _unstuff(stuffed: bytes) -> bytes | None:
     return b"\0".join(runs)
 
 
-class CobsFraming:
+class CobsFraming(SerialFraming):
     """Incremental decoder of stuffed binary frames; keeps at most MAX_STUFFED bytes between
     chunks.
     """
 
-    hint = ""
-
     def __init__(self) -> None:
-        self.counts = FramingCounts()
-        self._pending = b""
+        super().__init__()
         self._overlong = False
-        self._gap = SequenceGap(SEQUENCE_MODULUS)
-
-    @property
-    def pending(self) -> int:
-        """Bytes of the unfinished frame."""
-        return len(self._pending)
-
-    def clock_modulus(self, key: str) -> int:
-        return CLOCK_MODULUS
 
     def reset(self) -> None:
-        self.counts.garbage += self.pending
-        self._pending = b""
+        super().reset()
         self._overlong = False
-        self._gap.expected = None
 
     def decode(self, chunk: bytes) -> list[Frame]:
         *pieces, last = (self._pending + chunk).split(b"\0")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from gritd.drivers import framing_ascii, framing_cobs
 from gritd.drivers.can_libraries import Message, Signal, can
 from gritd.drivers.can_signals import database
-from gritd.drivers.framing import FieldValue, Frame
+from gritd.drivers.framing import CLOCK_MODULUS, SEQUENCE_MODULUS, FieldValue, Frame
 from gritd.drivers.framing_can import COUNTERS, DEVICE_TIME
 from gritd.estimator.config.settings import Device
 
@@ -26,9 +26,9 @@ class SerialWire:
         """The bytes of one frame; device_us [µs] may run past its wrap. Counters must have wrapped
         already.
         """
-        wrapped = None if device_us is None else device_us % framing_cobs.CLOCK_MODULUS
+        wrapped = None if device_us is None else device_us % CLOCK_MODULUS
         frame = Frame(key, self._sequence, wrapped, tuple(values))
-        self._sequence = (self._sequence + 1) % framing_cobs.SEQUENCE_MODULUS
+        self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         return self._encode(frame)
 
 

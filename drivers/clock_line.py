@@ -29,55 +29,52 @@ class ClockLine:
     """Offset of our clock over the device's, as a function of the device time."""
 
     def __init__(self) -> None:
-        self._slope: float | None = None  # the drift, where it is known
+        self._slope = 0.0  # the drift
+        self._is_known = False
+        self._open: list[tuple[int, Point]] = []  # the block's two lowest points, with heights
         self.begin([(0, 0)])
 
     def at(self, time: int) -> int:
         """The offset [ns] at a device time [ns]."""
-        return self._level + self._drifted(time)
+        return self._level + int(self._slope * (time - self._zero))
 
     def begin(self, points: Sequence[Point]) -> None:
         """Forget the line, but not the drift, and begin it at one or more points."""
         self._blocks: deque[Point] = deque(maxlen=BLOCKS)  # the lowest point of each
-        self._open: list[Point] = []  # the two lowest of the present block
-        self._zero, self._began = points[0][0], sum(points[0])
+        self._zero = points[0][0]
         self._level = min(map(self._height, points))
+        self._open_block(sum(points[0]))
 
         for point in points:
             self.add(point)
 
     def add(self, point: Point) -> None:
         """Take up the frame of a chunk that waited least."""
-        self._open = sorted([*self._open, point], key=self._height)[:2]
+        self._open = sorted([*self._open, (self._height(point), point)])[:2]
         if len(self._open) < 2:
             return
 
-        self._level = min(self._level, self._height(self._lowest()))
+        lowest, second = self._open
+        height, edge = second if second[0] - lowest[0] > CLOSE else lowest
+        self._level = min(self._level, height)
         if sum(point) - self._began >= BLOCK:
-            self._close(sum(point))
-
-    def _drifted(self, time: int) -> int:
-        return round((self._slope or 0.0) * (time - self._zero))
+            self._blocks.append(edge)
+            self._open_block(sum(point))
+            self._fit()
 
     def _height(self, point: Point) -> int:
-        return point[1] - self._drifted(point[0])
+        return point[1] - int(self._slope * (point[0] - self._zero))
 
-    def _lowest(self) -> Point:
-        """The lowest point of the block that is not alone."""
-        lowest, second = self._open
-        return second if self._height(second) - self._height(lowest) > CLOSE else lowest
-
-    def _close(self, now: int) -> None:
-        """End the block and fit the line anew."""
-        self._blocks.append(self._lowest())
+    def _open_block(self, now: int) -> None:
         self._open, self._began = [], now
 
+    def _fit(self) -> None:
         if self._has_moved():
             self._blocks = deque([self._blocks[-1]], BLOCKS)
         if len(self._blocks) >= SLOPE_AFTER:
-            self._slope = self._fitted()
+            self._slope, self._is_known = self._fitted(), True
 
-        shown = list(self._blocks)[-KNOWN if self._slope is None else 0 :]
+        shown = list(self._blocks)[0 if self._is_known else -KNOWN :]
         self._level = min(map(self._height, shown))
 
     def _has_moved(self) -> bool:

@@ -22,15 +22,16 @@ EARLY = 10e6  # [ns] what comes earlier than this over the line has a wrong time
 WINDOW = 0.15e9  # [ns] in which frames vote; they have to agree for
 MOST = 2 / 3  # of it, and so many of them, for some may be wrong
 PAUSE = 40_000_000  # [ns] between two frames: more does not count in the window
+TOGETHER = 0.5e6  # [ns] frames that come so close upon each other have one vote
 USELESS = 0.5e9  # [ns] without any frame that could be right: the clock has another rate
 SILENCE = 5.5e9  # [ns] without one on the line: longer than a computer is expected to stand still
 
 
 class Vote(NamedTuple):
-    """The last frame of a chunk, which waited least [ns].
+    """The last frame of those that came together, which waited least [ns].
 
-    age: since the first vote, without pauses. is_possible: its time could be right, and no frame of
-    the chunk is older than the two before it.
+    age: since the first vote, without pauses. is_possible: their times could be right, and none is
+    older than the two before it.
     """
 
     time: int
@@ -98,7 +99,7 @@ class DeviceClock:
         self._is_started = True
         self._heard = received  # when a frame last came that could be right
         self._newest = self._second = time  # the two latest that were on the line
-        self._before: list[int] = []  # the last two
+        self._before = time, time  # the last two
         self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
         self._line.begin([(time, received - time)])
         self._unsettle(received)
@@ -107,6 +108,8 @@ class DeviceClock:
         """The line follows the lowest delays at once, until it has been confirmed."""
         self._is_settled = False
         self._votes: list[Vote] = []
+        self._age = 0  # time in which frames came, and when the last did
+        self._came = received
         self._on_line = self._doubted = received  # when a frame last was, and the first since not
         self._seen = self._off = 0  # chunks since then, and those off the line
 
@@ -172,17 +175,27 @@ class DeviceClock:
 
     def _went_back(self, times: list[int]) -> bool:
         """Whether one is older than the two before it."""
-        all_of = [*self._before, *times]
-        self._before = all_of[-2:]
-        return any(c < min(a, b) for a, b, c in zip(all_of, all_of[1:], all_of[2:], strict=False))
+        first, second = self._before
+        went_back = False
+        for time in times:
+            went_back = went_back or time < min(first, second)
+            first, second = second, time
+        self._before = first, second
+        return went_back
 
     def _vote(self, time: int, received: int, is_possible: bool) -> None:
         """Take up a frame as a vote, and drop the old ones."""
-        before = self._votes[-1] if self._votes else Vote(time, received - time, 0)
-        age = before.age + min(received - before.received, PAUSE)
-        self._votes.append(Vote(time, received - time, age, is_possible))
-        while age - self._votes[0].age > WINDOW:
-            del self._votes[0]
+        votes, self._age = self._votes, self._age + min(received - self._came, PAUSE)
+        self._came = received
+
+        vote = Vote(time, received - time, self._age, is_possible)
+        if votes and self._age - votes[-1].age < TOGETHER:
+            before = votes.pop()
+            vote = vote._replace(age=before.age, is_possible=is_possible and before.is_possible)
+        votes.append(vote)
+
+        while self._age - votes[0].age > WINDOW:
+            del votes[0]
 
     def _agreed(self) -> list[Vote]:
         """The votes for one line: most of them, for a while; none as long as there is no such."""
@@ -212,8 +225,8 @@ class DeviceClock:
 
     def _is_suspect(self, offset: int) -> bool:
         """Whether a late frame belongs to others that nothing but a step explains."""
-        suspects = [vote for vote in self._votes[-self._off :] if not vote.is_possible]
-        return sum(abs(offset - vote.offset) <= LATE for vote in suspects) > 1
+        since = [vote for vote in self._votes if vote.received >= self._doubted]
+        return sum(not v.is_possible and abs(offset - v.offset) <= LATE for v in since) > 1
 
     # --- stamps
     # -----------------------------------------------------------------------------------

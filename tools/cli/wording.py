@@ -55,8 +55,8 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def fixed(value: float, places: int) -> str:
-    """With a true minus sign."""
-    return f"{value:.{places}f}".replace("-", "−")
+    """With a true minus sign; 0 has none."""
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")
 
 
 def magnitude(value: float) -> int:

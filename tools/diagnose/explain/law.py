@@ -28,7 +28,6 @@ from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.rig.interface import LawForm
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.screen.scans import in_step
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
@@ -97,7 +96,6 @@ def _with_functions(screening: Screening, model: Model) -> Start:
     if not chosen:
         return Start(problem, fitted, (), np.zeros((problem.stack.size, 0)))
 
-    chosen = [in_step(screening.families, problem, fitted, s) for s in chosen]
     columns = TUNING.fit.strength_prior * np.column_stack([s.columns for s in chosen])
     beside = problem.beside(columns)
     refitted = beside.descend(fitted.effects, fitted.free, fitted.u, fitted.x)
@@ -139,7 +137,7 @@ def _terms(start: Start, form: LawForm, names: list[str], domain: Domain) -> tup
         for name in names
     ]
     parts = parts_of(fitted.projection(), start.problem.noise, each)
-    kept = take_up(parts, range(len(each)), len(each)).parts
+    kept = take_up(parts, range(len(each)), len(each), share=TUNING.explain.least_share).parts
     return tuple(Free(form.effect, parameters[names[i]], form.effect.name) for i in kept)
 
 

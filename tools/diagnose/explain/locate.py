@@ -22,10 +22,8 @@ from gritd.tools.diagnose.explain.result import Location
 from gritd.tools.diagnose.fit import heldout
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.projection import Projected
 from gritd.tools.diagnose.fit.selection import Parts, Taken, Tried, likeliest, parts_of, take_up
 from gritd.tools.diagnose.fit.shape import Shape
-from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.scans import (
     candidates,
@@ -60,12 +58,6 @@ class Dictionary:
     def of(self, channel: str) -> list[int]:
         """Those of a channel."""
         return [k for k, f in enumerate(self.functions) if f.shape.channel == channel]
-
-    def gain(self, some: Sequence[int]) -> float:
-        """Nats that some of them gain together beyond what noise gives them."""
-        own: list[Index] = [self.parts.own[k] for k in some]
-        together = np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *own]))
-        return Projected(self.parts.a, self.parts.b).gain(together)[0]
 
     def choose(self, tried: Tried, slack: float) -> int:
         """The likeliest function; in its place a mean, or steps between runs or along the bed, that
@@ -170,7 +162,7 @@ def _places(stack: Stack, residual: Array, tried: Dictionary, here: list[int]) -
     """Of one channel, a place for every covariate that is taken up."""
     least = float(np.log(tried.kinds / TUNING.screen.level))
     taken = take_up(tried.parts, here, len(here), least, TUNING.explain.least_share, tried.choose)
-    whole = max(tried.gain(here), SPAN)
+    whole = max(tried.parts.gain(here), SPAN)
 
     groups: dict[str, list[int]] = {}
     for number, k in enumerate(taken.parts):
@@ -195,13 +187,13 @@ def _places(stack: Stack, residual: Array, tried: Dictionary, here: list[int]) -
 def _added(tried: Dictionary, taken: Taken, number: int) -> float:
     """Nats that a function gains beside those before it."""
     before, beside = taken.parts[:number], taken.parts[: number + 1]
-    return tried.gain(beside) - tried.gain(before)
+    return tried.parts.gain(beside) - tried.parts.gain(before)
 
 
 def _covariate(tried: Dictionary, shape: Shape, here: list[int]) -> str:
     """A product of covariates is filed under the one that takes most alone."""
     smooth = {tried.functions[k].shape: [k] for k in here}
-    alone = {n: tried.gain(smooth.get(Shape(shape.channel, (n,)), [])) for n in shape.along}
+    alone = {n: tried.parts.gain(smooth.get(Shape(shape.channel, (n,)), [])) for n in shape.along}
     return max(alone, key=lambda name: alone[name])
 
 

@@ -18,11 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import gammaincc
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Index
-from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.rig.interface import Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,45 +31,6 @@ class WhitenedBlock:
 
     rows: slice
     columns: NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Projected:
-    """A (m, m) and b (m,) of m columns."""
-
-    a: Array
-    b: Array
-
-    def without(self, directions: Array) -> Projected:
-        """With combinations of the columns, (m, k), projected out too."""
-        turned = self.a @ directions
-        gram = directions.T @ turned + np.eye(directions.shape[1]) / TUNING.fit.projected_prior**2
-        taken = np.linalg.solve(gram, turned.T)
-        return Projected(self.a - turned @ taken, self.b - taken.T @ (directions.T @ self.b))
-
-    def without_columns(self, own: slice) -> Projected:
-        """With a block of the columns projected out too."""
-        return self.without(np.eye(len(self.a))[:, own])
-
-    def combined(self, directions: Array) -> Projected:
-        """Of combinations of the columns, (m, k)."""
-        return Projected(directions.T @ self.a @ directions, directions.T @ self.b)
-
-    def gain(self, own: Index) -> tuple[float, float]:
-        """Nats that some of the columns, of unit normal weights, gain beyond what noise alone gives
-        them in the mean, and its chance of as many: as of the gamma distribution of the same mean
-        and variance (Satterthwaite 1946, Biometrics Bulletin 2, 110-114).
-        """
-        a, b = self.a[np.ix_(own, own)], self.b[own]
-        known = np.maximum(np.linalg.eigvalsh(a), 0.0)
-        share = 0.5 * known / (1.0 + known)  # of noise alone: Σ share χ² of one degree
-        mean, variance = float(share.sum()), 2.0 * float(share @ share)
-        if variance <= 0.0:
-            return 0.0, 1.0
-
-        value = 0.5 * float(b @ np.linalg.solve(a + np.eye(own.size), b))
-        chance = float(gammaincc(mean**2 / variance, value * mean / variance))
-        return max(value - mean, 0.0), chance
 
 
 class Projection:
@@ -103,14 +62,6 @@ class Projection:
         return (
             columns.T @ columns - inside.T @ inside,
             columns.T @ self.residual - inside.T @ self._pulled,
-        )
-
-    def project_rows(self, columns: Array, rows: Bools) -> Projected:
-        """The same for whitened columns (n, m) that are 0 outside n marked values, rows (N,)."""
-        inside = self._solved(self.jacobian[rows].T @ columns)
-        return Projected(
-            columns.T @ columns - inside.T @ inside,
-            columns.T @ self.residual[rows] - inside.T @ self._pulled,
         )
 
     def project_block(self, block: WhitenedBlock) -> tuple[Array, Array, Array]:

@@ -36,6 +36,16 @@ class Parts:
         bayes = log_bayes(self.a[np.ix_(own, own)], self.b[own], (0,) * own.size)
         return float(bayes) + sum(self.prior[k] for k in taken)
 
+    def gain(self, taken: Sequence[int]) -> float:
+        """Nats that some parts, of unit normal weights, gain together beyond what noise alone gives
+        them in the mean.
+        """
+        own = np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(self.own[k] for k in taken)]))
+        a, b = self.a[np.ix_(own, own)], self.b[own]
+        known = np.maximum(np.linalg.eigvalsh(a), 0.0)
+        noise = 0.5 * float(np.sum(known / (1.0 + known)))
+        return max(0.5 * float(b @ np.linalg.solve(a + np.eye(own.size), b)) - noise, 0.0)
+
 
 def parts_of(
     beside: Projection, noise: Noise, functions: Sequence[Signature], kinds: float = 0.0

@@ -295,36 +295,6 @@ def _refined(
     return float(near[int(np.argmax(finer.in_phase(beside, shared)))])
 
 
-def in_step(
-    search: Sequence[Family], problem: Problem, fitted: Fitted, wave: Signature
-) -> Signature:
-    """A wave in time with one phase for all runs, where that is likelier than one for each; else as
-    it was found.
-    """
-    shape = wave.shape
-    family = next(f for f in search if f.shape == shape.family)
-    if shape.kind != "wave" or family.axis != "time" or shape.shared or shape.at is None:
-        return wave
-    stack, beside = problem.stack, without_harmonics(problem, fitted)
-
-    x = stack.covariate("time")[stack.of(shape.channel)]
-    reach = float(family.at[1] - family.at[0]) if family.at.size > 1 else 0.0
-    count = (
-        int(
-            min(2.0 * reach * TUNING.screen.wave_density * np.ptp(x), TUNING.noise.most_frequencies)
-        )
-        + 1
-    )
-    tried = shape.at + reach * np.linspace(-1.0, 1.0, count)
-
-    finer = waves(stack, problem.noise, shape.channel, "time", tried)
-    value = finer.in_phase(beside, True) - np.log(count)
-    best = int(np.argmax(value))
-    if value[best] < finer.in_phase(beside, False).max():
-        return wave
-    return _signature(stack, replace(shape, at=float(tried[best]), shared=True), wave.prior)
-
-
 def _signature(stack: Stack, shape: Shape, prior: float) -> Signature:
     columns = shape_columns(stack, shape)
     return Signature(shape, columns, (0,) * columns.shape[1], {}, prior)

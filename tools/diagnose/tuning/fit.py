@@ -149,9 +149,6 @@ class FitTuning:
     )
 
     # --- projection.py ---
-    projected_prior: float = tuned(
-        3.0, "-", "prior standard deviation of what is projected out, in expected sizes"
-    )
 
     # --- shared.py: what the reference shows already ---
     shared_sizes: tuple[float, ...] = tuned(

@@ -54,9 +54,6 @@ class ScreenTuning:
         0.015, "-", "of the whole stretch: a wheel is on both sides of a step for a while"
     )
     peaks: int = tuned(4, "shapes", "of a family that are fitted", "run time")
-    wave_density: float = tuned(
-        4.0, "-", "frequencies tried in each that the whole campaign resolves"
-    )
     ripple_harmonics: int = tuned(4, "harmonics", "of a ripple that is known")
     large_ripple: float = tuned(3.0, "-", "their standard deviation in expected sizes")
     frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")

@@ -48,7 +48,11 @@ def _unfinished(model: Model) -> Iterator[str]:
 
 
 def _loud(rig: Rig, noise: Noise) -> Iterator[str]:
-    """Channels whose grid values scatter more than single readings should."""
+    """Channels whose grid values scatter more than single readings should; a row of a table is no
+    reading.
+    """
+    if rig.tabled:
+        return
     for channel, colour in zip(rig.channels, noise.colours, strict=True):
         stated = rig.stated_noise.get(channel, 0.0)
         if stated > 0.0 and colour.sigma > TUNING.explain.loud * stated:

@@ -17,21 +17,24 @@ import numpy as np
 
 from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain.result import NextExperiment
+from gritd.tools.diagnose.explain.result import Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Foreseen, Rig
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SQUARE
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
-def next_experiment(search: EffectSearch, decision: Decision) -> NextExperiment | None:
+def next_experiment(
+    search: EffectSearch, decision: Decision, location: Sequence[Location]
+) -> NextExperiment | None:
     """None where model and recordings agree, or one explanation stands alone."""
     if decision.verdict == "insufficient":
         return _most_shown(_unseen_shown(search))
     if decision.verdict == "unlisted":
-        return _shape_of_misfit(search, _mistaken(decision))
+        return _along_misfit(search.problem.stack.rig, location, _mistaken(decision))
 
     rivals = _rivals(search, decision)
     return _between(search, rivals) if len(rivals) > 1 else None
@@ -203,18 +206,15 @@ def _mistaken(decision: Decision) -> tuple[str, ...]:
     return names or (() if likeliest is None else (likeliest,))
 
 
-def _shape_of_misfit(search: EffectSearch, separates: tuple[str, ...]) -> NextExperiment | None:
+def _along_misfit(
+    rig: Rig, location: Sequence[Location], separates: tuple[str, ...]
+) -> NextExperiment:
     """A step of the condition along which the misfit lives, to tell some effects from it; the gain
-    is its evidence so far, for as much again.
+    is its evidence so far, for one run more. A misfit without a place is a ripple of the wheel.
     """
-    evidence = search.first.unexplained
-    if not evidence:
-        return None
-
-    shape, menu = max(evidence, key=lambda s: evidence[s]), search.problem.stack.rig.menu
-    key = menu.along.get(shape.along[0], menu.otherwise)
-    gain = evidence[shape] / max(len(search.problem.stack.rig.runs), 1)
-    return _foretold(key, max(gain, 0.0), separates)
+    covariate, q = (location[0].covariate, location[0].q) if location else ("wheel_angle", 1.0)
+    gain = -float(np.log(max(q, SQUARE))) / len(rig.runs)
+    return _foretold(rig.menu.along.get(covariate, rig.menu.otherwise), gain, separates)
 
 
 # ---- what is foreseen --------------------------------------------------------------------------

@@ -59,9 +59,9 @@ def explain(
     with meanwhile(jobs, lambda: _located(search, accepted, before)) as located:
         hypotheses = _hypotheses(search, decision, folds)
         soil = soil_of(problem, base.fitted, decision)
-        proposed = next_experiment(search, decision)
         learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
         location = located()
+    proposed = next_experiment(search, decision, location)
 
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     left, fit = remainders(problem, accepted), _fit(problem, before, after)

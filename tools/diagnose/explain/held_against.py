@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gritd.tools.diagnose.explain.coverage import coverage
+import numpy as np
+
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, Reference
+from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.rig.stack import Stack
+from gritd.tools.diagnose.screen.covered import covered_share
+from gritd.tools.diagnose.tuning import TUNING
+
+NAMED = ("slip", "load", "speed", "position")
 
 
 def with_reference(diagnosis: Diagnosis, rig: Rig, verdict: str | None) -> Diagnosis:
@@ -20,6 +26,28 @@ def with_reference(diagnosis: Diagnosis, rig: Rig, verdict: str | None) -> Diagn
             effect, parameter = constant.parameter
             effects.setdefault(effect, {})[parameter] = diagnosis.nuisance[constant.name]
 
-    covered = coverage(Stack(rig))
-    reference = Reference(verdict, covered.share, covered.outside, effects)
+    stack = Stack(rig)
+    reference = Reference(verdict, covered_share(stack), _outside(stack), effects)
     return replace(diagnosis, reference=reference)
+
+
+def _outside(stack: Stack) -> str:
+    """Covariates in which the new campaign goes beyond its reference."""
+    driving = stack.covariate("speed") > 0.0
+    parts = []
+
+    for name in NAMED:
+        values = stack.covariate(name)
+        known, asked = values[driving & ~stack.new], values[driving & stack.new]
+        room = TUNING.explain.beyond * max(
+            float(np.ptp(known)), TUNING.explain.beyond * abs(float(np.mean(known)))
+        )
+
+        for beyond, end, word in (
+            (asked > known.max() + room, float(known.max()), "above"),
+            (asked < known.min() - room, float(known.min()), "below"),
+        ):
+            if np.mean(beyond) > TUNING.explain.beyond:
+                parts.append(f"{np.mean(beyond):.0%} {word} {value_of(stack, name, end)}")
+
+    return "; ".join(parts) or "nothing"

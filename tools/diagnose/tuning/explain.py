@@ -11,7 +11,7 @@ from gritd.tools.diagnose.tuning.field import tuned
 class Explain:
     """What of a diagnosis is reported."""
 
-    # --- coverage.py, learnt.py ---
+    # --- held_against.py, learnt.py ---
     beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
 
     # --- doubts.py, result.py ---

@@ -26,7 +26,7 @@ def test_every_parameter_at_its_bound_is_told_but_a_strength_at_nought() -> None
         free=free,
         converged=True,
     )
-    rig: Any = SimpleNamespace(constants=[SimpleNamespace(name="c")], channels=())
+    rig: Any = SimpleNamespace(constants=[SimpleNamespace(name="c")], channels=(), tabled=False)
     assert doubts(rig, _model(fitted), SimpleNamespace(colours=())) == (
         "At its bound: ratio of rear_contact is 1.",
         "At its bound: breadth of rear_contact is 0.",
@@ -41,6 +41,7 @@ def test_noise_far_above_what_is_stated_is_told(sigma: float, told: int) -> None
         channels=("sinkage",),
         units={"sinkage": "m"},
         stated_noise={"sinkage": 2.5e-4},
+        tabled=False,
     )
     fitted: Any = SimpleNamespace(
         u=np.zeros(0), x=np.zeros(0), held=np.zeros(0, bool), free=[], converged=True

@@ -32,12 +32,12 @@ $(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
 demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
 	@$(BIN)/gritd demo
 
-# a worker more than two cores: some tests wait for real time
+# a worker more than two cores: some tests wait for real time; none is idle while another has tests left
 test: $(READY) ## the tests that a change needs at once
-	@$(BIN)/python -m pytest --quiet -n 3 -m "not long and not slow"
+	@$(BIN)/python -m pytest --quiet -n 3 --dist worksteal -m "not long and not slow"
 
 long: $(READY) ## whole campaigns, benches, worlds and faults: what decides a verdict, with every submission
-	@$(BIN)/python -m pytest --quiet -n 3 -m "long and not slow"
+	@$(BIN)/python -m pytest --quiet -n 3 --dist worksteal -m "long and not slow"
 
 tutorial: $(READY) ## the pages and notebooks of docs/first-day and docs/your-data, word for word
 	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs

@@ -9,7 +9,7 @@ on-line filter share them.
 
 from __future__ import annotations
 
-import textwrap
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -226,14 +226,12 @@ class Effect:
     @classmethod
     def sentence(cls) -> str:
         """What the effect is, in plain words."""
-        return (cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ")
+        return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
     @classmethod
     def formula(cls) -> str:
         """The formula and its source."""
-        return textwrap.dedent(
-            "    " + (cls.__doc__ or "").strip().partition("\n\n")[2].lstrip()
-        ).strip()
+        return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[2].strip()
 
 
 def order_of(effect: type[Effect]) -> str | None:

@@ -32,12 +32,17 @@ def guarded(command: Callable[[], int | None]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
-        return _leave_pipe()
+        _leave_output()
+        return DONE
     except SystemExit as error:
         if not blamed(error.__traceback__):
             raise
         return _fail(_of_plugin(error))
     except Exception as error:
+        try:
+            sys.stdout.flush()
+        except OSError:
+            _leave_output()
         known = isinstance(error, KNOWN) or memory.line(error)
         return _fail(error if known or not blamed(error.__traceback__) else _of_plugin(error))
 
@@ -74,7 +79,8 @@ def _one_line(error: Exception) -> str:
     return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
 
 
-def _leave_pipe() -> int:
-    """The reader of our output has gone: say nothing, not even when Python flushes at exit."""
+def _leave_output() -> None:
+    """Its reader has gone, or it is full: nothing more goes there, not even as Python flushes at
+    exit.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return DONE

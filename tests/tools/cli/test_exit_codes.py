@@ -4,6 +4,7 @@ wrong content.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -61,10 +62,12 @@ def test_numbers(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert said.err.count("\n") == 1
 
 
-def test_an_output_that_is_full_is_one_line_without_a_number() -> None:
+@pytest.mark.parametrize("buffered", [{}, {"PYTHONUNBUFFERED": "1"}])
+def test_an_output_that_is_full_is_one_line_without_a_number(buffered: dict[str, str]) -> None:
+    others = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "gritd", "effects"],
-            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=others | buffered,
         )  # fmt: skip
     assert (done.returncode, done.stderr) == (1, "gritd: no space left on device\n")

@@ -13,7 +13,7 @@ class Example:
     before: str = ""  # what they need, in the same folder; DOCS is that of the documents
     during_demo: bool = False  # they need a daemon: that of the example of `demo`
     seconds: float | None = None  # Ctrl-C ends it then
-    code: int = 0  # with which it may end, beside 0
+    code: int = 0  # with which it may end, as well as 0
     shown: str = ""  # where they run for minutes: the page that has what they print
 
 

@@ -48,13 +48,14 @@ def _each(examples: Mapping[str, Example], folder: Path) -> Iterator[tuple[str, 
 
 
 def _demo(examples: Mapping[str, Example], folder: Path) -> Iterator[tuple[str, Printed]]:
-    """The demo, and what needs a daemon meanwhile."""
+    """The demo, and what needs a daemon meanwhile: this one, whatever else runs on the machine."""
     demo = _started(examples["demo"].lines[0], folder)
     time.sleep(RUNNING)
 
     for name, example in examples.items():
         if example.during_demo:
-            yield name, [_ended(_started(line, folder)) for line in example.lines]
+            lines = [f"{line} --socket runs/demo-*/gritd.sock" for line in example.lines]
+            yield name, [_ended(_started(line, folder)) for line in lines]
     yield "demo", [_ended(demo, examples["demo"])]
 
 

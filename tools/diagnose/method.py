@@ -3,7 +3,7 @@
     signals      readings of every recording on a common grid           rig/signals.py
     ripples      of the wheel, at the recordings' own rate               orders/lines.py
     rig          channels, constants with their priors, a prediction     rig/interface.py
-    reference    what it shows by itself, the steps below for it alone   verdict/anyway.py
+    reference    what it shows by itself, the steps below for it alone   verdict/baseline.py
     noise        size and colour of each channel, from the recordings    noise/estimate.py
     fit          soil and calibration within what is known of them       fit/base.py
     screen       one pass: the evidence of every effect, and an alarm    screen/screening.py
@@ -33,7 +33,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
-from gritd.tools.diagnose.verdict.anyway import had_anyway
+from gritd.tools.diagnose.verdict.baseline import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Verdict
 

@@ -32,7 +32,7 @@ from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decide import taken_share
-from gritd.tools.diagnose.verdict.nameless import nameless_functions
+from gritd.tools.diagnose.verdict.unexplained import nameless_functions
 
 Domain = Mapping[str, tuple[float, float]]
 

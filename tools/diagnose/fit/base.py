@@ -11,11 +11,11 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms, of_differences
-from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.fit.random_effect import Freedom
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
 from gritd.tools.diagnose.noise.colour import Noise

@@ -15,9 +15,9 @@ import numpy as np
 
 from gritd.estimator.model.discrepancy import features_of
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Bools, FormSource
 from gritd.tools.diagnose.rig.stack import Stack

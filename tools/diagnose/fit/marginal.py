@@ -23,8 +23,8 @@ from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
-from gritd.tools.diagnose.fit.freedom import Freedom, products
 from gritd.tools.diagnose.fit.problem import Fitted, Free
+from gritd.tools.diagnose.fit.random_effect import Freedom, products
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.bending import bending_freedoms, had_freedoms
-from gritd.tools.diagnose.fit.freedom import Freedom
+from gritd.tools.diagnose.fit.form_error import bending_freedoms, had_freedoms
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
+from gritd.tools.diagnose.fit.random_effect import Freedom
 from gritd.tools.diagnose.tuning import TUNING
 
 

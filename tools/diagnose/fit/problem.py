@@ -15,9 +15,9 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
-from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.nuisance import Allowance
 from gritd.tools.diagnose.fit.projection import Projection
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant
 from gritd.tools.diagnose.rig.stack import Stack

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten

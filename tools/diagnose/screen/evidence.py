@@ -21,8 +21,8 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
-from gritd.tools.diagnose.fit.bending import varied_along_place
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_evidence, log_sum
+from gritd.tools.diagnose.fit.form_error import varied_along_place
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
@@ -108,7 +108,7 @@ def pass_beside(problem: Problem, model: Model, first: Pass) -> Pass:
 
 
 def varied_pass(problem: Problem, model: Model, first: Pass, jobs: int = 1) -> Pass:
-    """A pass in which one strength of each effect may vary along the bed, as `bending.py` lets it:
+    """A pass in which one strength of each effect may vary along the bed, by `form_error.py`:
     where soil takes the mean of an effect, what varies about it tells the strength.
 
     jobs: processes.

@@ -28,10 +28,10 @@ from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_sum
-from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.fit.random_effect import Freedom
 from gritd.tools.diagnose.rig.interface import Bools, Index
 
 

@@ -26,10 +26,10 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.discrepancy import usual_sizes
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_sum
-from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.fit.random_effect import Freedom
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import some_of
 from gritd.tools.diagnose.noise.colour import whiten

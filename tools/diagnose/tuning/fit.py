@@ -25,7 +25,7 @@ class FitTuning:
     )
     rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
 
-    # --- bending.py: how far published forms of an effect differ ---
+    # --- form_error.py: how far published forms of an effect differ ---
     bending_sizes: tuple[float, ...] = tuned(
         (0.0, 0.05, 0.15, 0.4), "-", "shares of an effect", FORMS
     )

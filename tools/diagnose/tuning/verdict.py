@@ -66,7 +66,7 @@ class Verdict:
         0.4, "share", "of the effects that must be detectable at their expected size: consistent"
     )
 
-    # --- nameless.py ---
+    # --- unexplained.py ---
     function_sizes: tuple[float, ...] = tuned(
         (1.0, 5.0), "-", "of a function, in its expected size, where it is fitted"
     )

@@ -25,8 +25,8 @@ from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, w
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
-from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 from gritd.tools.diagnose.verdict.resemblance import trusted
+from gritd.tools.diagnose.verdict.unexplained import Nameless, nameless_beside
 
 
 def decide(

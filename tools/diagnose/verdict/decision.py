@@ -7,7 +7,7 @@ from math import prod
 from typing import Literal
 
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.verdict.nameless import Nameless
+from gritd.tools.diagnose.verdict.unexplained import Nameless
 
 Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 

@@ -10,10 +10,10 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import EFFECTS
-from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
+from gritd.tools.diagnose.fit.nuisance import Allowance
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
 
 N = 40
 SIZES = Sizes((0.0, 0.3, 1.0, 4.0), (0.1, 0.2, 0.3, 0.4))

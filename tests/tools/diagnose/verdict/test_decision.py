@@ -16,13 +16,13 @@ from scipy.stats import norm
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.cli.command import CommandError
-from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.bending import bending_sizes
 from gritd.tools.diagnose.fit.evidence import strength_sizes
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
+from gritd.tools.diagnose.fit.form_error import bending_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.nuisance import Allowance
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.search.calibration import learnt

@@ -13,7 +13,7 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
-from gritd.tools.diagnose.fit.bending import _following, bending_freedoms, had_freedoms
+from gritd.tools.diagnose.fit.form_error import _following, bending_freedoms, had_freedoms
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.stack import Stack

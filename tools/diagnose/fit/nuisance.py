@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.freedom import Freedom, products
+from gritd.tools.diagnose.fit.random_effect import Freedom, products
 
 
 @dataclass(frozen=True, eq=False)

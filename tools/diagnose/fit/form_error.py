@@ -34,9 +34,9 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
-from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack

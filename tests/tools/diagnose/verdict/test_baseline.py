@@ -18,7 +18,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
-from gritd.tools.diagnose.verdict.anyway import had_anyway
+from gritd.tools.diagnose.verdict.baseline import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import record

@@ -2,7 +2,7 @@
 
 A freedom is a set of columns with unit normal weights, times one size for all of them. Its size has
 a prior over a few values. The form of the model has freedoms (discrepancy.py), and so
-has every effect, whose published forms differ (bending.py).
+has every effect, whose published forms differ (form_error.py).
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
-from gritd.tools.diagnose.verdict.baseline import had_anyway
+from gritd.tools.diagnose.verdict.baseline import baseline_effects
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Verdict
 
@@ -100,7 +100,7 @@ def accustomed(
 
     said("fitting the soil and the noise")
     decision = decide(_searched(alone, said, jobs), jobs, said)
-    return rig.having(had_anyway(alone, decision)), decision.verdict
+    return rig.having(baseline_effects(alone, decision)), decision.verdict
 
 
 def _searched(rig: Rig, step: Callable[[str], None], jobs: int) -> EffectSearch:

@@ -32,7 +32,7 @@ from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decide import taken_share
-from gritd.tools.diagnose.verdict.unexplained import nameless_functions
+from gritd.tools.diagnose.verdict.unexplained import unexplained_functions
 
 Domain = Mapping[str, tuple[float, float]]
 
@@ -92,7 +92,7 @@ def find_law(search: EffectSearch, model: Model, location: Sequence[Location]) -
 
 def _with_functions(screening: Screening, model: Model) -> Start:
     problem, fitted = screening.problem, model.fitted
-    chosen = [s for s in nameless_functions(screening, model) if s.shape.kind != "smooth"]
+    chosen = [s for s in unexplained_functions(screening, model) if s.shape.kind != "smooth"]
     if not chosen:
         return Start(problem, fitted, (), np.zeros((problem.stack.size, 0)))
 

@@ -47,7 +47,7 @@ def usual_sizes(stack: Stack, forms: Sequence[Freedom], model: Model) -> Chosen:
         most = len(one.sizes.values) - 1
         if one.name in held:
             off = _rms(one.columns @ model.of_form(number))
-            usual = off <= max(TUNING.fit.bending_sizes) * _rms(held[one.name])
+            usual = off <= max(TUNING.fit.form_error_sizes) * _rms(held[one.name])
             most = model.sizes[number] if usual else 0
         out.append(most)
     return tuple(out)

@@ -49,12 +49,12 @@ OF_SHEAR = "contact"  # the stage of shear stress, which follows the shear displ
 OF_SOIL = ("soil", "contact", "wheel")  # stages whose effects follow: soil has to move first
 
 
-def bending_sizes() -> Sizes:
+def form_error_sizes() -> Sizes:
     """Shares by which published forms of an effect differ, with their prior."""
-    return Sizes(TUNING.fit.bending_sizes, TUNING.fit.bending_prior)
+    return Sizes(TUNING.fit.form_error_sizes, TUNING.fit.form_error_prior)
 
 
-def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
+def form_errors(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
     """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
     numbered = enumerate(fitted.acting)
     acting = [_Acting(effect, _added(stack, fitted, number)) for number, effect in numbered]
@@ -131,7 +131,7 @@ def _other_forms(
     if effect.stage == OF_SHEAR:
         displaced = _displaced(stack, noise, fitted, added)
         columns = np.column_stack((columns, _share(displaced, functions)))
-    yield columns, bending_sizes(), 0 if effect.stage in EXACT else 1
+    yield columns, form_error_sizes(), 0 if effect.stage in EXACT else 1
 
 
 def _share(added: Array, functions: Array) -> Array:

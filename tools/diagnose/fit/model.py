@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.form_error import bending_freedoms, had_freedoms
+from gritd.tools.diagnose.fit.form_error import form_errors, had_freedoms
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.random_effect import Freedom
@@ -173,7 +173,7 @@ def fit_model(
     for number in range(TUNING.fit.size_rounds):
         known = every
         if number < TUNING.fit.bent_anew or _unbent(fitted, every):
-            every = (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
+            every = (*forms, *form_errors(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
 

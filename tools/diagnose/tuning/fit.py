@@ -26,10 +26,10 @@ class FitTuning:
     rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
 
     # --- form_error.py: how far published forms of an effect differ ---
-    bending_sizes: tuple[float, ...] = tuned(
+    form_error_sizes: tuple[float, ...] = tuned(
         (0.0, 0.05, 0.15, 0.4), "-", "shares of an effect", FORMS
     )
-    bending_prior: tuple[float, ...] = tuned(
+    form_error_prior: tuple[float, ...] = tuned(
         (0.2, 0.3, 0.35, 0.15), "prior", "probability of each of the sizes", FORMS
     )
 

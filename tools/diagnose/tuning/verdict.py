@@ -36,7 +36,7 @@ class Verdict:
         0.5, "probability", "of an explanation whose names are not accepted, to be reported"
     )
 
-    # --- resemblance.py, of each of `fit.bending_sizes` ---
+    # --- resemblance.py, of each of `fit.form_error_sizes` ---
     share_power: float = tuned(
         4.0,
         "-",

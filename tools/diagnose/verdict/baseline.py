@@ -27,7 +27,7 @@ from gritd.tools.diagnose.verdict.decision import Decision
 PASSING = {*BEYOND_FORM, TURNING}
 
 
-def had_anyway(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ...]:
+def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ...]:
     """The lasting effects that are accepted of a reference alone, at their fitted values, each with
     the sigma of an effect of which nothing is known: both campaigns will tell it anew.
 

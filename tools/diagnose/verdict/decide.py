@@ -26,7 +26,7 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
 from gritd.tools.diagnose.verdict.resemblance import trusted
-from gritd.tools.diagnose.verdict.unexplained import Nameless, nameless_beside
+from gritd.tools.diagnose.verdict.unexplained import Nameless, unexplained_with
 
 
 def decide(
@@ -62,7 +62,7 @@ def _beside(
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return attempted(lambda: nameless_beside(search.screening, model))
+            return attempted(lambda: unexplained_with(search.screening, model))
 
     made = each(jobs, nameless, models, shared(search), lambda done: tell(done, len(models)))
     return dict(zip(models, made, strict=True))
@@ -115,7 +115,7 @@ def judged(
     kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
     told, share = _standing(search, best, kept, calibration)
     if told not in beside:
-        beside = {told: attempted(lambda: nameless_beside(search.screening, told))}
+        beside = {told: attempted(lambda: unexplained_with(search.screening, told))}
 
     return Decision(
         "explained" if told.names else "unlisted",

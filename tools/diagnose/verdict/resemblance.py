@@ -53,7 +53,7 @@ def _likelihood(rig: Rig, model: Model, name: str) -> Array:
     effect = next(one for one in model.fitted.acting if one.name == name)
     told = None if _has_line(rig, effect) else model.of_forms(name)
     if told is None:
-        return np.ones(len(TUNING.fit.bending_sizes))
+        return np.ones(len(TUNING.fit.form_error_sizes))
     return np.asarray(np.exp(told - told.max()))
 
 

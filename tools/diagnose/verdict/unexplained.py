@@ -30,7 +30,7 @@ class Nameless:
     gain: float
 
 
-def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
+def unexplained_with(screening: Screening, model: Model) -> Nameless | None:
     """The functions that act together beside a model; None where none pays for itself."""
     chosen, price = _chosen(screening, model)
     if not chosen:
@@ -41,7 +41,7 @@ def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
     return Nameless(best, tuple(chosen), gain) if gain > 0.0 else None
 
 
-def nameless_functions(screening: Screening, model: Model) -> list[Signature]:
+def unexplained_functions(screening: Screening, model: Model) -> list[Signature]:
     """Unexplained terms that act together beside a model."""
     return _chosen(screening, model)[0]
 

@@ -13,7 +13,7 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
-from gritd.tools.diagnose.fit.form_error import _following, bending_freedoms, had_freedoms
+from gritd.tools.diagnose.fit.form_error import _following, form_errors, had_freedoms
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.stack import Stack
@@ -65,7 +65,7 @@ def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     fitted = problem.descend(
         (effect,), free, np.zeros(len(stack.rig.constants)), np.ones(len(free)), rounds=0
     )
-    *_, freedom = bending_freedoms(stack, problem.noise, fitted)
+    *_, freedom = form_errors(stack, problem.noise, fitted)
 
     plain = stack.predict(np.zeros(len(stack.rig.constants)), ())
     added = fitted.predicted - plain
@@ -105,7 +105,7 @@ def _drifting(zero: np.ndarray) -> float:
     none = np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, none, start, rounds=0)
 
-    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    freedoms = form_errors(stack, problem.noise, fitted)
     every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(none) :]])
     drift = np.where(stack.of("drawbar_pull"), zero, 0.0)
     left = drift - every @ np.linalg.lstsq(every, drift, rcond=None)[0]
@@ -136,13 +136,13 @@ def test_an_effect_beside_others_that_run_away_has_no_other_forms(
     free = free_of(effects)
     none = np.zeros(len(stack.rig.constants))
     fitted = problem.descend(effects, free, none, np.ones(len(free)), rounds=0)
-    assert {f.name for f in bending_freedoms(stack, problem.noise, fitted)} == {
+    assert {f.name for f in form_errors(stack, problem.noise, fitted)} == {
         "bulldozing",
         "motor_heating",
     }
 
     monkeypatch.setattr(Stack, "predict", lambda *_: np.full(stack.size, np.nan))
-    assert not bending_freedoms(stack, problem.noise, fitted)
+    assert not form_errors(stack, problem.noise, fitted)
 
 
 @pytest.mark.parametrize(("name", "slips"), [("shear_peak", True), ("bulldozing", False)])
@@ -154,7 +154,7 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
-    *_, freedom = bending_freedoms(stack, problem.noise, fitted)
+    *_, freedom = form_errors(stack, problem.noise, fitted)
 
     names = [constant.name for constant in stack.rig.constants]
     slipping = fitted.raw[:, names.index(stack.rig.slipping)]
@@ -176,7 +176,7 @@ def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool)
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
-    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    freedoms = form_errors(stack, problem.noise, fitted)
     assert len(freedoms) == (2 if placed else 1)
 
     place = stack.covariate("position")
@@ -216,7 +216,7 @@ def test_no_law_says_what_profile_a_hub_has() -> None:
     fitted = problem.descend((EFFECTS["hub_runout"],), free, *start, rounds=0)
     profiles = [
         f
-        for f in bending_freedoms(stack, problem.noise, fitted)
+        for f in form_errors(stack, problem.noise, fitted)
         if f.columns.shape[1] == 2 * TUNING.fit.harmonics
     ]
     assert [f.sizes.values[-1] for f in profiles] == [2.0]
@@ -233,7 +233,7 @@ def test_a_steady_effect_has_no_profile() -> None:
     stack, free = problem.stack, free_of((EFFECTS["bulldozing"],))
     start = np.zeros(len(stack.rig.constants)), np.ones(len(free))
     fitted = problem.descend((EFFECTS["bulldozing"],), free, *start, rounds=0)
-    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    freedoms = form_errors(stack, problem.noise, fitted)
     assert all(f.sizes.values[-1] < 2.0 for f in freedoms)
 
 
@@ -250,7 +250,7 @@ def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_n
     as_had = had.descend((), (), np.zeros(len(rig.constants)), np.zeros(0), rounds=0)
     np.testing.assert_allclose(as_had.predicted, as_new.predicted, rtol=1e-6, atol=1e-6)
 
-    ours = bending_freedoms(plain.stack, plain.noise, as_new)
+    ours = form_errors(plain.stack, plain.noise, as_new)
     theirs = had_freedoms(had.stack, had.noise, as_had)
     assert [f.name for f in theirs] == [f.name for f in ours]
     for one, other in zip(ours, theirs, strict=True):

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
-from gritd.tools.diagnose.verdict.baseline import had_anyway
+from gritd.tools.diagnose.verdict.baseline import baseline_effects
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import record
@@ -87,32 +87,32 @@ def decided(*effects: Effect, quick: bool = True) -> tuple[WheelRig, Decision]:
 
 def test_a_lag_lasts_if_nothing_could_stand_in_its_place() -> None:
     rig, decision = decided(LAG)
-    (found,) = had_anyway(rig, decision)
+    (found,) = baseline_effects(rig, decision)
     assert found.name == "contact_relaxation"
     assert abs(found.parameters["length"].value - 0.06) < 0.01
     assert found.parameters["forces"].sigma == HAD.parameters["forces"].sigma
 
     unsure = replace(decision, groups={"contact_relaxation": ("sensor_latency",)})
-    assert had_anyway(rig, unsure) == ()
+    assert baseline_effects(rig, unsure) == ()
 
 
 def test_what_begins_anew_in_every_run_lasts() -> None:
     rig, decision = decided(BEGINNING)
-    assert [effect.name for effect in had_anyway(rig, decision)] == ["running_in"]
+    assert [effect.name for effect in baseline_effects(rig, decision)] == ["running_in"]
 
 
 def test_what_goes_with_the_day_does_not() -> None:
     rig, decision = decided(make("drying_cohesion", {"change": 0.6, "duration": 100.0}))
     assert decision.best.names == ("drying_cohesion",)
-    assert had_anyway(rig, replace(decision, groups={"drying_cohesion": ()})) == ()
+    assert baseline_effects(rig, replace(decision, groups={"drying_cohesion": ()})) == ()
 
 
 def test_a_ripple_has_another_phase_in_each_run() -> None:
     rig, decision = decided(RIPPLE)
     assert decision.best.names == ("gear_ripple",)
-    assert had_anyway(rig, decision) == ()
+    assert baseline_effects(rig, decision) == ()
 
 
 def test_nothing_is_had_where_nothing_alarms() -> None:
     rig, decision = decided(quick=False)
-    assert decision.verdict == "consistent" and had_anyway(rig, decision) == ()
+    assert decision.verdict == "consistent" and baseline_effects(rig, decision) == ()

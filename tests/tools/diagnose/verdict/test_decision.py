@@ -17,7 +17,7 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.fit.evidence import strength_sizes
-from gritd.tools.diagnose.fit.form_error import bending_sizes
+from gritd.tools.diagnose.fit.form_error import form_error_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.nuisance import Allowance
@@ -49,7 +49,7 @@ def test_another_published_form_keeps_its_name() -> None:
     """
     ours = _model((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
     other = _model((HessSoomFriction(size=1.5),), "stribeck_friction")
-    assert ours.bends == (bending_sizes().values[0],) < other.bends
+    assert ours.bends == (form_error_sizes().values[0],) < other.bends
     assert other.marginal is not None
     assert other.evidence > other.marginal.log_evidence((0,)) + 3.0
 
@@ -92,7 +92,7 @@ def _judged(listed: float, nameless: float, trust: float, monkeypatch: pytest.Mo
     """One effect that is so far to be trusted against unexplained terms, of so much evidence
     each [nats].
     """
-    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    monkeypatch.setattr(decide, "unexplained_with", lambda *_: None)
     bare, best = Fit(()), Fit(("a",))
     search: Any = SimpleNamespace(bare=bare, screening=None)
     weighed: Any = [
@@ -123,7 +123,7 @@ def test_what_is_likelier_resembled_than_there_is_not_named(
 
 def test_no_name_is_stated_that_is_less_likely_than_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """Listed effects together are likelier than none, but no single one is."""
-    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    monkeypatch.setattr(decide, "unexplained_with", lambda *_: None)
     by, names = learnt(30), "abc"
     bare, every = Fit(()), [Fit((name,)) for name in names]
     even = by.temperature * (by.nameless - by.listed + np.log(30))
@@ -138,7 +138,7 @@ def test_no_name_is_stated_that_is_less_likely_than_none(monkeypatch: pytest.Mon
 
 def test_of_equals_the_simplest_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coulomb before Stribeck, unless Stribeck is clearly likelier."""
-    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    monkeypatch.setattr(decide, "unexplained_with", lambda *_: None)
     bare, plain, richer = Fit(()), Fit(("plain",)), Fit(("richer",), 2)
     search: Any = SimpleNamespace(bare=bare, screening=None)
     for more, first in ((1.0, "plain"), (20.0, "richer")):
@@ -161,7 +161,7 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """None is the likeliest number, but two of three say that there is something listed."""
-    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    monkeypatch.setattr(decide, "unexplained_with", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     by = learnt(30)
     weighed: Any = [
@@ -182,7 +182,7 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
 
 def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A companion gains little, and unexplained terms gain much beside either model."""
-    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    monkeypatch.setattr(decide, "unexplained_with", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     alone: Any = [
         decide.WeighedExplanation(one, ("a",), 0, 900.0),

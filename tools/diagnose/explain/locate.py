@@ -10,7 +10,8 @@ taken by a smooth function and has no change point.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,11 +50,13 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Functions of all channels beside a model. kinds: number of families among which they are."""
+    """Functions of all channels beside a model. kinds: number of families of each channel among
+    which they are.
+    """
 
     functions: Sequence[Signature]
     parts: Parts
-    kinds: int
+    kinds: Mapping[str, int]
 
     def of(self, channel: str) -> list[int]:
         """Those of a channel."""
@@ -73,7 +76,9 @@ class Dictionary:
         if alike:
             return min(alike, key=lambda k: (self.parts.own[k].size, -tried[k]))
         steps = [k for k in tried if shapes[k].places and shapes[k].along == along]
-        return likeliest({best: tried[best] + slack, **{k: tried[k] for k in steps}}, slack)
+        return likeliest(
+            {best: tried[best] + slack + TUNING.screen.sure, **{k: tried[k] for k in steps}}, slack
+        )
 
 
 def _scheduled(shape: Shape) -> bool:
@@ -108,8 +113,8 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
 def locate(
     screening: Screening, model: Model, predicted: Array | None = None
 ) -> tuple[Location, ...]:
-    """Places of the misfit of a model, by evidence; only those that noise shows in one campaign of
-    a hundred at most, all that were tried counted.
+    """Places of the misfit of a model, by evidence; only those that noise shows in a channel in
+    one campaign of a hundred at most, all that were tried there counted.
 
     predicted: (N,) against which the sentences are said; without it the model's, each value's own
         run held out.
@@ -122,7 +127,7 @@ def locate(
     tried = dictionary(screening, model)
     places = _strains(stack, model)
     for channel in stack.rig.channels:
-        places += _places(stack, residual, tried, tried.of(channel))
+        places += _places(stack, residual, tried, channel)
     places.sort(key=lambda place: -place.nats)
     named: dict[tuple[str, str], Location] = {}
     for place in places:  # of those of one channel and covariate the first
@@ -155,12 +160,19 @@ def dictionary(screening: Screening, model: Model) -> Dictionary:
         np.union1d(own, means[f.shape.channel]) if f.shape.channel in means else own
         for f, own in zip(functions, parts.own, strict=True)
     ]
-    return Dictionary(functions, replace(parts, own=about), len(smooth) + len(families))
+    steps = [f.shape for f in families if f.shape.kind == "step"]  # and stretches between two
+    tried = [*(s.shape for s in smooth), *(f.shape for f in families), *steps]
+    kinds = Counter(shape.channel for shape in tried)
+    return Dictionary(functions, replace(parts, own=about), kinds)
 
 
-def _places(stack: Stack, residual: Array, tried: Dictionary, here: list[int]) -> list[Place]:
+def _places(stack: Stack, residual: Array, tried: Dictionary, channel: str) -> list[Place]:
     """Of one channel, a place for every covariate that is taken up."""
-    least = float(np.log(tried.kinds / TUNING.screen.level))
+    here = tried.of(channel)
+    if not here:
+        return []
+    kinds = tried.kinds[channel]
+    least = float(np.log(kinds / TUNING.screen.level))
     taken = take_up(tried.parts, here, len(here), least, TUNING.explain.least_share, tried.choose)
     whole = max(tried.parts.gain(here), SPAN)
 
@@ -177,7 +189,7 @@ def _places(stack: Stack, residual: Array, tried: Dictionary, here: list[int]) -
             size = _size(tried, taken, group[0])
             words = wording.sentence(stack, residual, shapes[0], covariate, share, size)
             location = Location(
-                shapes[0].channel, covariate, share, p, min(p * tried.kinds, 1.0), words,
+                channel, covariate, share, p, min(p * kinds, 1.0), words,
                 tuple(_changes(covariate, shapes)),
             )  # fmt: skip
             places.append(Place(nats, location))

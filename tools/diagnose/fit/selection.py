@@ -85,14 +85,15 @@ def take_up(
     choose: Callable[[Tried, float], int] = likeliest,
 ) -> Taken:
     """Parts one after the other, while each gains more than `least` and that share of what the ones
-    before it have. choose: which is next, of the evidence of each and what a gain must be.
+    before it have. choose: which is next, of the evidence of each and of what may be given up.
     """
     taken = Taken()
     while len(taken.parts) < min(most, len(among)):
         tried = {k: of.evidence([*taken.parts, k]) for k in among if k not in taken.parts}
-        slack = max(least, share * max(tried.values()))
-        best = choose(tried, slack)
-        if tried[best] - taken.evidence <= max(least, share * taken.evidence):
+        slack, need = max(least, share * max(tried.values())), max(least, share * taken.evidence)
+        likely = (choose(tried, slack), likeliest(tried, slack))
+        best = next((k for k in likely if tried[k] - taken.evidence > need), None)
+        if best is None:
             break
         taken.parts.append(best)
         taken.gains.append(tried[best] - taken.evidence)

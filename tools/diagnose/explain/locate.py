@@ -68,7 +68,8 @@ class Dictionary:
         motion that is driven in steps has them, so these do not compete with other covariates.
         """
         shapes = {k: self.functions[k].shape for k in tried}
-        best = likeliest({k: e for k, e in tried.items() if not _scheduled(shapes[k])}, slack)
+        free = {k: e for k, e in tried.items() if not _scheduled(shapes[k])}
+        best = likeliest(free or tried)
         along = shapes[best].along
 
         plain = [("constant",), *([along] if along in PREPARED else [])]
@@ -76,9 +77,7 @@ class Dictionary:
         if alike:
             return min(alike, key=lambda k: (self.parts.own[k].size, -tried[k]))
         steps = [k for k in tried if shapes[k].places and shapes[k].along == along]
-        return likeliest(
-            {best: tried[best] + slack + TUNING.screen.sure, **{k: tried[k] for k in steps}}, slack
-        )
+        return likeliest({best: tried[best] + slack, **{k: tried[k] for k in steps}})
 
 
 def _scheduled(shape: Shape) -> bool:

@@ -71,7 +71,7 @@ class Taken:
         return sum(self.gains)
 
 
-def likeliest(tried: Tried, slack: float) -> int:
+def likeliest(tried: Tried, slack: float = 0.0) -> int:
     """The part of the largest evidence."""
     return max(tried, key=lambda k: tried[k])
 
@@ -90,10 +90,10 @@ def take_up(
     taken = Taken()
     while len(taken.parts) < min(most, len(among)):
         tried = {k: of.evidence([*taken.parts, k]) for k in among if k not in taken.parts}
-        slack, need = max(least, share * max(tried.values())), max(least, share * taken.evidence)
-        likely = (choose(tried, slack), likeliest(tried, slack))
-        best = next((k for k in likely if tried[k] - taken.evidence > need), None)
-        if best is None:
+        best = choose(tried, max(least, share * max(tried.values())))
+        if not taken.parts and tried[best] <= least:  # the plainer one is not enough by itself
+            best = likeliest(tried)
+        if tried[best] - taken.evidence <= max(least, share * taken.evidence):
             break
         taken.parts.append(best)
         taken.gains.append(tried[best] - taken.evidence)

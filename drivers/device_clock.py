@@ -260,7 +260,7 @@ class DeviceClock:
 
         self._seen += 1
         self._off += self._delay(time, received) > LATE
-        if received - self._on_line < WINDOW:
+        if received - self._on_line < MOST * WINDOW:
             return
         if self._off > MOST * self._seen:
             self._begin(time, received)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from gritd.tools.view.words import headline
 PLACES = 200  # of a first look
 SMALL = 8 << 20  # [bytes] what is read whole at once
 WAY = 300  # points of the way of (c, tan φ)
+UNSEEN = 5.0  # [s] after which the rest is read though no page was drawn
 TABLES = {"/tick": TICK_FIELDS}
 
 
@@ -77,6 +78,7 @@ class Recordings:
         for path in paths:
             self.runs.append(first_look(path))
             looked()
+        self._drawn = Event()  # a page has its first curves: until then nothing else is done
         self._rest = Thread(target=self._read_on, name="reader", daemon=True)
 
     def start(self) -> None:
@@ -110,7 +112,9 @@ class Recordings:
         end = float(curves.axis(along)[-1])
         chosen = span or (0.0, float(np.nextafter(end, np.inf)))
         fewer = points if curves.whole else min(points, PLACES)
-        return *curves.stretch(along, chosen, fewer), curves.way_of_the_soil(along, chosen, WAY)
+        drawn = *curves.stretch(along, chosen, fewer), curves.way_of_the_soil(along, chosen, WAY)
+        self._drawn.set()
+        return drawn
 
     def moment(self, run: int, along: Along, at: float) -> dict[str, Any]:
         """What the page shows of an instant of a run."""
@@ -141,6 +145,7 @@ class Recordings:
     def _read_on(self) -> None:
         for run in self.runs:
             if not run.curves.whole:
+                self._drawn.wait(UNSEEN)
                 try:
                     recording = files.recording(run.path, TABLES)
                     run.curves = _curves(recording, whole=True).prepared()

@@ -46,11 +46,11 @@ def of(runs: list[Path]) -> list[lab.LabRun]:
 def test_the_original_equations_are_what_a_simulated_run_obeys(of: list[lab.LabRun]) -> None:
     """The simulator is Eqs. (1)-(10): they fit within the noise, the closed form does not."""
     for run in of:
-        assert run.beside is not None
+        assert run.windows is not None
         for channel in ("torque", "drawbar_pull"):
-            noise = run.beside.noise(channel)
-            assert run.beside.off(channel, "original") < 4.0 * noise
-        assert run.beside.off("torque", "closed") > 2.0 * run.beside.off("torque", "original")
+            noise = run.windows.noise(channel)
+            assert run.windows.off(channel, "original") < 4.0 * noise
+        assert run.windows.off("torque", "closed") > 2.0 * run.windows.off("torque", "original")
 
 
 @pytest.mark.parametrize("effect, value", [("bed_slope.angle", 0.1), ("bulldozing.share", 1.0)])
@@ -72,8 +72,10 @@ def test_the_curves_have_the_configured_effects(effect: str, value: float, tmp_p
     for each in (settings, knowing):
         given = [(settings_of_run(each, recording.run), recording) for recording in [read(run)]]
         (made,) = lab.lab_runs(list(bed_runs(given, each.bed.repeatability)))
-        assert made.beside is not None
-        offs.append(made.beside.off("drawbar_pull", "original") / made.beside.noise("drawbar_pull"))
+        assert made.windows is not None
+        offs.append(
+            made.windows.off("drawbar_pull", "original") / made.windows.noise("drawbar_pull")
+        )
     assert offs[1] < 3.0 and offs[0] > 10.0
 
 
@@ -144,7 +146,7 @@ def test_damage_is_told_by_the_name_of_its_file(
 
 def test_loads_of_one_run_are_told_apart(of: list[lab.LabRun]) -> None:
     """Each load is a curve of its own over slip; a few windows between two loads are none."""
-    first, second = (run.beside for run in of)
+    first, second = (run.windows for run in of)
     assert first is not None and second is not None
     changing = first.at(np.arange(2))
     changing.load[:] = (60.0, 75.0)

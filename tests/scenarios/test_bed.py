@@ -10,6 +10,7 @@ import pytest
 
 from gritd.estimator.daemon import bed_file
 from tests.scenarios import rig
+from tests.scenarios.recorded import rows, verified
 
 BED = "bed file that cannot be, or of another time"
 UPDATES = 20  # more of them in every run; how many more, the computer's load decides
@@ -42,12 +43,12 @@ def test_a_run_begins_with_what_the_run_before_it_knows(tmp_path):
     assert after < 0.8 * before
     before, after = (sigma_after(daemon, UPDATES) for daemon in (first, second))
     assert after < before
-    assert rig.verified(first.path()) and rig.verified(second.path())
+    assert verified(first.path()) and verified(second.path())
 
 
 def sigma_after(daemon, updates):
     """σ of tan φ at the first tick with so many updates."""
-    ticks = rig.rows(daemon.path(), "/tick")
+    ticks = rows(daemon.path(), "/tick")
     return ticks["tan_phi_sigma"][ticks["updates"] >= updates][0]
 
 
@@ -106,5 +107,5 @@ def begins_anew(folder, content):
         daemon.stop()
     prior = rig.TESTBED.settings.soil.cohesion
     told = daemon.lines("begins with the stated prior")
-    first = rig.rows(daemon.path(), "/tick")[0]
-    return len(told) == 1 and first["cohesion"] == prior.value and rig.verified(daemon.path())
+    first = rows(daemon.path(), "/tick")[0]
+    return len(told) == 1 and first["cohesion"] == prior.value and verified(daemon.path())

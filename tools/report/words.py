@@ -112,5 +112,5 @@ def to_tell(verdict: str, names: Sequence[str]) -> str:
     if verdict == "insufficient":
         return f"it would show {listed(names) if len(names) <= FEW else f'{len(names)} effects'}"
     if verdict == "unlisted":
-        return f"it would tell {listed(names)} from what is not listed"
-    return f"it would tell {listed(names)} apart"
+        return f"it would distinguish {listed(names)} from what is not listed"
+    return f"it would distinguish {listed(names)}"

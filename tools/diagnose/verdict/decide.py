@@ -113,7 +113,7 @@ def judged(
     trust = _trust(every, best)
     least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
     kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
-    told, share = _standing(search, best, kept, calibration)
+    told, share = _told(search, best, kept)
     if told not in beside:
         beside = {told: attempted(lambda: unexplained_with(search.screening, told))}
 
@@ -145,26 +145,17 @@ def trusting(
     return made
 
 
-def _standing(
-    search: EffectSearch, best: WeighedExplanation, kept: Sequence[str], by: OddsCalibration
+def _told(
+    search: EffectSearch, best: WeighedExplanation, kept: Sequence[str]
 ) -> tuple[Model, float]:
-    """The model of the names that are accepted, and the share that they take: where some of the
-    best are not, the others must stand without them.
-    """
-    if len(kept) == len(best.names):
-        return best.model, best.share
+    """The model of the names that are accepted, and the share that they take."""
     model = best.model
     for name in best.names:
         if name not in kept:
             model = without(search, model, name)
-    if not model.names:
-        return search.bare, 0.0
-
-    share = taken_share(search, model)
-    stands = all(
-        p > TUNING.verdict.there for p in trusted(search.problem.stack.rig, model, share, by)
-    )
-    return (model, share) if stands else (search.bare, 0.0)
+    if model is best.model:
+        return model, best.share
+    return model, taken_share(search, model) if model.names else 0.0
 
 
 def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:

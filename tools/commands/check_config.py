@@ -216,6 +216,7 @@ def _wrench(wrench: Wrench) -> Rows:
     """One row for each component that is used."""
     components = [
         ("drawbar_pull", wrench.drawbar_pull, wrench.force_noise, "N"),
+        ("side_force", wrench.side_force, wrench.force_noise, "N"),
         ("load", wrench.load, wrench.force_noise, "N"),
         ("torque", wrench.torque, wrench.torque_noise, "N·m"),
     ]
@@ -230,6 +231,7 @@ def _wrench(wrench: Wrench) -> Rows:
             _ms(wrench),
         )
         for name, given, noise, unit in components
+        if given is not None
     ]
 
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gritd.config import packaged
 from gritd.estimator.config.configuration import load
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import read_all
+from gritd.tools.main import main
 from gritd.tools.proof.blind import strata
 from gritd.tools.proof.blind.cases import BlindCase, drawn
 from gritd.tools.proof.blind.handover import CONFIGURATION, driven, write
@@ -53,6 +57,20 @@ def test_a_side_force_without_calibration_is_recorded_only(
 ) -> None:
     _, files, settings = skewed
     assert "side_force" not in rig_of(read_all(files), settings)[0].channels
+
+
+def test_check_config_shows_the_axis_and_refuses_a_scale_of_nil(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = packaged().read_text(encoding="utf-8")
+    shutil.copy(packaged("testbed.dbc"), tmp_path)
+    for scale, code in (("0", 2), ("0.5", 0)):
+        path = tmp_path / "bench.yaml"
+        stated = f"  wrench:\n    side_force: {{scale: {scale}}}\n"
+        path.write_text(re.sub(r"  wrench:.*\n", stated, whole, count=1), encoding="utf-8")
+        assert main(["check-config", str(path)]) == code
+        said = capsys.readouterr()
+        assert "side_force" in (said.out if code == 0 else said.err)
 
 
 @pytest.mark.long

@@ -86,8 +86,9 @@ def _values(settings: Settings) -> Iterator[tuple[str, float]]:
     for name, channel in settings.channels.items():
         yield from _calibration(f"channels.{name}", channel.calibration)
     if (wrench := settings.wrench) is not None:
-        for axis in ("drawbar_pull", "load", "torque"):
-            yield from _calibration(f"channels.wrench.{axis}", getattr(wrench, axis))
+        for axis in ("drawbar_pull", "side_force", "load", "torque"):
+            if (known := getattr(wrench, axis)) is not None:
+                yield from _calibration(f"channels.wrench.{axis}", known)
 
 
 def _calibration(key: str, calibration: Calibration) -> Iterator[tuple[str, float]]:

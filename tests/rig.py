@@ -27,6 +27,17 @@ NS = 1_000_000_000
 PULLEY = 0.02  # [m]
 COUNT = 2 * pi / 65536  # [rad]
 PULLEY_COUNT = 2 * pi / 8192  # [rad]
+# what the stages up to the vertical balance add to a `Situation`
+BALANCED = dict(
+    cohesion=1000.0,
+    tan_phi=0.6,
+    shear_modulus=0.02,
+    sinkage=0.02,
+    carried=60.0,
+    theta_1=0.8,
+    torque=2.0,
+    drawbar_pull=3.0,
+)
 
 
 def calibration(scale, offset=0.0, scale_sigma=0.0, offset_sigma=0.0):

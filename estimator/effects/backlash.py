@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
 from gritd.estimator.stages.history import Bools, run_begins
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Balanced, Loaded
 from gritd.estimator.terramechanics.soil import Array, Scalar
 
 UNMOVED = 1e-12  # [rad] a smaller step is none
@@ -36,12 +36,12 @@ class Backlash(Effect):
     )
     confusable_with = told_apart(wheel_inertia="reversal", stribeck_friction="reversal")
 
-    def torque_loss(self, situation: Situation) -> Scalar:
-        if np.ndim(situation.wheel_angle) == 0:
+    def torque_loss(self, situation: Loaded) -> Scalar:
+        if not isinstance(situation, Balanced):  # on line
             return 0.0
         return -situation.torque * self._inside(situation)
 
-    def _inside(self, situation: Situation) -> Array:
+    def _inside(self, situation: Balanced) -> Array:
         """w, 0 … 1."""
         angle = np.asarray(situation.wheel_angle)
         begins = run_begins(situation.run, angle.size)

@@ -16,7 +16,19 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from gritd.estimator.stages.situation import ContactLaw, Motion, Reaction, Recall, Sensed, Situation
+from gritd.estimator.stages.situation import (
+    Balanced,
+    Complete,
+    ContactLaw,
+    Loaded,
+    Motion,
+    OnSoil,
+    Powered,
+    Reaction,
+    Recall,
+    Sensed,
+    Situation,
+)
 from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
 
 Stage = Literal["soil", "contact", "wheel", "testbed", "drivetrain", "sensor", "any"]
@@ -164,45 +176,45 @@ class Effect:
         """The soil here and now."""
         return soil
 
-    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+    def contact(self, law: ContactLaw, situation: OnSoil) -> ContactLaw:
         """How stress is spread and mobilised on the rim."""
         return law
 
-    def load(self, load: Scalar, situation: Situation) -> Scalar:
+    def load(self, load: Scalar, situation: OnSoil) -> Scalar:
         """The load on the soil (n,) [N], from the weights on the axle (n,) [N]."""
         return load
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         """Forces on the axle and its sinkage beyond what the rim stresses give."""
         return reaction
 
-    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def testbed(self, reaction: Reaction, situation: Balanced) -> Reaction:
         """What the rig's frame adds or takes before the sensors."""
         return reaction
 
-    def torque_loss(self, situation: Situation) -> Scalar:
+    def torque_loss(self, situation: Loaded) -> Scalar:
         """Torque consumed between motor and axle (n,), seen from the axle [N·m], positive for
         forward rotation.
         """
         return 0.0
 
-    def torque_factor(self, situation: Situation) -> Scalar:
+    def torque_factor(self, situation: Powered) -> Scalar:
         """True over configured torque constant (n,) [-]."""
         return 1.0
 
-    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
+    def sensors(self, sensed: Sensed, situation: Loaded) -> Sensed:
         """What the channels read, from what is true."""
         return sensed
 
-    def correct(self, sensed: Sensed, situation: Situation) -> Sensed:
+    def correct(self, sensed: Sensed, situation: Loaded) -> Sensed:
         """What is true, from what the channels read: the inverse of `sensors`."""
         return sensed
 
-    def answered(self, slip: Scalar, load: Scalar, situation: Situation) -> tuple[Scalar, Scalar]:
+    def answered(self, slip: Scalar, load: Scalar, situation: Complete) -> tuple[Scalar, Scalar]:
         """On line: slip and load [N] that the rim's stresses answer to, from the present ones."""
         return slip, load
 
-    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+    def remember(self, memory: Recall, step: float, situation: Complete) -> Recall:
         """On line: the memory one `step` [s] later; others find it in situation.memory."""
         return memory
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Reaction
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Bulldozing(Effect):
         side_wall_rubbing="load_step", bed_slope="reversal", force_crosstalk="reversal"
     )
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         z, phi = np.maximum(situation.sinkage, 0.0), np.arctan(situation.tan_phi)
         x = 0.25 * np.pi - 0.5 * phi
         cot_x = 1.0 / np.tan(x)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.history import followed
-from gritd.estimator.stages.situation import Reaction, Recall, Situation
+from gritd.estimator.stages.situation import Balanced, Complete, OnSoil, Reaction, Recall
 from gritd.estimator.terramechanics.soil import Scalar
 
 ARC = 1.0  # [rad] of a usual contact
@@ -61,7 +61,7 @@ class ContactRelaxation(Effect):
     def in_steady_states(cls) -> None:
         return None
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         # at rest the soil's forces fade out, and with them what they lag
         forces = self.forces * np.abs(situation.direction)
         return replace(
@@ -73,7 +73,7 @@ class ContactRelaxation(Effect):
             + self.sinkage * self._behind(situation.sinkage, situation, self.deeper),
         )
 
-    def answered(self, slip: Scalar, load: Scalar, situation: Situation) -> tuple[Scalar, Scalar]:
+    def answered(self, slip: Scalar, load: Scalar, situation: Complete) -> tuple[Scalar, Scalar]:
         behind = situation.memory.get(self.name, ())
         if not behind:
             return slip, load
@@ -85,7 +85,7 @@ class ContactRelaxation(Effect):
             load + lagging * (behind[1] - load),
         )
 
-    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+    def remember(self, memory: Recall, step: float, situation: Complete) -> Recall:
         mobilised = -np.expm1(-_mobilising(situation) * situation.slip)
         now = float(mobilised), float(situation.carried)
         rim = situation.radius * np.abs(situation.wheel_speed)
@@ -99,7 +99,7 @@ class ContactRelaxation(Effect):
         """ds of the ways of rim and axle."""
         return self.rim * rim + (1.0 - self.rim) * axle
 
-    def _behind(self, steady: Scalar, situation: Situation, times: float) -> Scalar:
+    def _behind(self, steady: Scalar, situation: Balanced, times: float) -> Scalar:
         """ȳ − y∞ over so many λ."""
         if np.ndim(steady) == 0:
             return 0.0
@@ -109,7 +109,7 @@ class ContactRelaxation(Effect):
         return followed(steady, share, situation.run) - steady
 
 
-def _mobilising(situation: Situation) -> Scalar:
+def _mobilising(situation: OnSoil) -> Scalar:
     """j/k halfway along a usual contact at slip 1: T and DP go with slip as 1 − e^(−i j/k)."""
     return 0.5 * ARC * situation.radius / situation.shear_modulus
 

@@ -15,7 +15,7 @@ from gritd.estimator.effects.base import (
     strength,
     told_apart,
 )
-from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Reaction
 from gritd.estimator.terramechanics.soil import Scalar
 
 
@@ -84,7 +84,7 @@ class EmpiricalLaw(Effect):
         coulomb_friction="speed_step", bulldozing="slip_step", sinkage_datum="tape"
     )
 
-    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def testbed(self, reaction: Reaction, situation: Balanced) -> Reaction:
         terms = self._terms(situation)
         torque = (
             self.torque_constant,
@@ -117,7 +117,7 @@ class EmpiricalLaw(Effect):
             sinkage=reaction.sinkage + _sum(depth, terms),
         )
 
-    def _terms(self, situation: Situation) -> tuple[Scalar, ...]:
+    def _terms(self, situation: Balanced) -> tuple[Scalar, ...]:
         """1, i, i², ζ, ν."""
         slip = np.clip(situation.slip, self.slip_from, self.slip_to)
         depth = np.clip(situation.sinkage / situation.radius, self.sinkage_from, self.sinkage_to)

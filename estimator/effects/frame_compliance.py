@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.situation import Sensed, Situation
+from gritd.estimator.stages.situation import Loaded, Sensed
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class FrameCompliance(Effect):
         sinkage_gain="dead_weight", sinkage_datum="load_step", rear_contact="dead_weight"
     )
 
-    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
+    def sensors(self, sensed: Sensed, situation: Loaded) -> Sensed:
         return replace(sensed, sinkage=sensed.sinkage + self.compliance * situation.carried)
 
-    def correct(self, sensed: Sensed, situation: Situation) -> Sensed:
+    def correct(self, sensed: Sensed, situation: Loaded) -> Sensed:
         return replace(sensed, sinkage=sensed.sinkage - self.compliance * situation.carried)

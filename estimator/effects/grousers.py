@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, Parameter, shape, strength, told_apart
-from gritd.estimator.stages.situation import ContactLaw, Reaction, Situation, dug_by_slip
+from gritd.estimator.stages.situation import Balanced, ContactLaw, Reaction, Situation, dug_by_slip
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 
 RIPPLE = ("ripple_cos", "ripple_sin", "lift_cos", "lift_sin", "count")
@@ -91,7 +91,7 @@ class Grousers(Effect):
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
         return replace(law, strength=law.strength * (1.0 + self.grip))
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         phase = self.count * situation.wheel_angle
         ripple = self.ripple_cos * np.cos(phase) + self.ripple_sin * np.sin(phase)
         lift = self.lift_cos * np.cos(phase) + self.lift_sin * np.sin(phase)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.history import presliding, run_by_run, smoothed, turned_round
-from gritd.estimator.stages.situation import Recall, Situation
+from gritd.estimator.stages.situation import OnSoil, Recall
 from gritd.estimator.terramechanics.soil import Array, Scalar
 
 
@@ -48,17 +48,18 @@ class LoadAxisFriction(Effect):
     needs_sinkage = True
     at_start = (1.0,)
 
-    def load(self, load: Scalar, situation: Situation) -> Scalar:
+    def load(self, load: Scalar, situation: OnSoil) -> Scalar:
         return load - np.minimum(self.friction, np.maximum(load, 0.0)) * self._direction(situation)
 
-    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+    def remember(self, memory: Recall, step: float, situation: OnSoil) -> Recall:
         moved = float(situation.sinking) * step / self.travel
         return (turned_round(memory[0], moved, self.exponent),)
 
-    def _direction(self, situation: Situation) -> Scalar:
+    def _direction(self, situation: OnSoil) -> Scalar:
         """s, −1 after rising … 1 after sinking."""
         if self.name in situation.memory:
             return situation.memory[self.name][0]
+        assert situation.sinkage is not None  # by needs_sinkage
         return run_by_run(self._turning, situation.run, situation.time, situation.sinkage)
 
     def _turning(self, time: Array, sinkage: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart, turning
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Loaded
 from gritd.estimator.terramechanics.soil import Scalar
 
 
@@ -33,5 +33,5 @@ class LoadDependentFriction(Effect):
         sidewall_friction="slip_step",
     )
 
-    def torque_loss(self, situation: Situation) -> Scalar:
+    def torque_loss(self, situation: Loaded) -> Scalar:
         return self.arm * situation.carried * turning(situation.wheel_speed)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.history import relaxed
-from gritd.estimator.stages.situation import Recall, Situation
+from gritd.estimator.stages.situation import Powered, Recall
 from gritd.estimator.terramechanics.soil import Scalar
 
 
@@ -39,14 +39,14 @@ class MotorHeating(Effect):
         torque_constant_error="long_run", drying_cohesion="long_run", viscous_friction="long_run"
     )
 
-    def torque_factor(self, situation: Situation) -> Scalar:
+    def torque_factor(self, situation: Powered) -> Scalar:
         return 1.0 / (1.0 + self.fall * self._heat(situation))
 
-    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+    def remember(self, memory: Recall, step: float, situation: Powered) -> Recall:
         (heat,) = memory
         return (float(heat + (situation.current**2 - heat) * -np.expm1(-step / self.duration)),)
 
-    def _heat(self, situation: Situation) -> Scalar:
+    def _heat(self, situation: Powered) -> Scalar:
         """H [A²]."""
         if self.name in situation.memory:
             return situation.memory[self.name][0]

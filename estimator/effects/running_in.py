@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Reaction
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class RunningIn(Effect):
         soil_patch="shifted_start", drying_cohesion="shifted_start", motor_heating="shifted_start"
     )
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         left = np.exp(-situation.travel / self.length)
         return replace(
             reaction,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Reaction
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,6 @@ class SideWallRubbing(Effect):
         bed_slope="reversal", force_crosstalk="reversal", bulldozing="load_step"
     )
 
-    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def testbed(self, reaction: Reaction, situation: Balanced) -> Reaction:
         lost = self.share * situation.carried * situation.direction
         return replace(reaction, drawbar_pull=reaction.drawbar_pull - lost)

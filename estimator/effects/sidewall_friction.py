@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Reaction
 from gritd.estimator.terramechanics.soil import Array
 
 AT_REST = 0.5  # lateral over normal stress in soil confined by the wheel [-]
@@ -45,7 +45,7 @@ class SidewallFriction(Effect):
         bulldozing="slip_step", coulomb_friction="slip_step", torque_constant_error="slip_step"
     )
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         r, sine = situation.radius, np.sin(situation.theta_1)
         pressure = AT_REST * situation.carried / (situation.width * r * np.maximum(sine, 1e-6))
         stress = self.share * (situation.cohesion + pressure * situation.tan_phi)

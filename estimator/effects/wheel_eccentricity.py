@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.situation import Motion, Reaction, Situation
+from gritd.estimator.stages.situation import Balanced, Motion, Reaction
 from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
 
@@ -38,7 +38,7 @@ class WheelEccentricity(Effect):
             wheel_speed=motion.wheel_speed * (1.0 + self._lift(motion.wheel_angle) / wheel.radius),
         )
 
-    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+    def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         angle = situation.wheel_angle
         slope = self.offset_sin * np.cos(angle) - self.offset_cos * np.sin(angle)  # dR/dψ
         return replace(

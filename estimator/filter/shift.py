@@ -30,7 +30,7 @@ import numpy as np
 from gritd.estimator.effects import in_order
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import paper_contact
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Motion, OnSoil, advanced, situation_of
 from gritd.estimator.terramechanics import linear, original
 from gritd.estimator.terramechanics.integrals import Integrals, integrals
 from gritd.estimator.terramechanics.linear import Shift
@@ -199,7 +199,7 @@ def true_integrals(
 
     Forces are linear in c and σₘ, so three evaluations with unit soils pick the integrals out.
     """
-    situation = _steady(wheel, soil, theta_1, slip)
+    situation = _steady(wheel, soil, slip)
     for effect in effects:
         soil = effect.soil(soil, situation)
     law = paper_contact(wheel, situation)
@@ -252,25 +252,17 @@ def _shift(
     return shift
 
 
-def _steady(wheel: Wheel, soil: Soil, theta_1: Array, slip: Array) -> Situation:
+def _steady(wheel: Wheel, soil: Soil, slip: Array) -> OnSoil:
     """A wheel in steady forward motion on fresh soil, at no particular place or time."""
-    return Situation(
-        time=0.0,
-        wheel_angle=0.0,
-        wheel_speed=0.0,
-        wheel_acceleration=0.0,
-        carriage_speed=0.0,
-        position=0.0,
-        pass_number=1.0,
-        radius=wheel.radius,
-        width=wheel.width,
+    motion = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, wheel_acceleration=0.0)
+    return advanced(
+        OnSoil,
+        situation_of(motion, wheel),
         slip=slip,
         direction=1.0,
-        load=0.0,
         cohesion=soil.cohesion,
         tan_phi=soil.tan_phi,
         shear_modulus=soil.shear_modulus,
-        theta_1=theta_1,
     )
 
 

@@ -21,11 +21,17 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.model import balance
 from gritd.estimator.model.correction import Correction
 from gritd.estimator.stages.situation import (
+    Balanced,
+    Complete,
     ContactLaw,
+    Loaded,
     Motion,
+    OnSoil,
+    Powered,
     Reaction,
     Sensed,
     Situation,
+    advanced,
     situation_of,
 )
 from gritd.estimator.terramechanics.original import OriginalForces
@@ -56,7 +62,7 @@ class Carried:
     """What the soil carries, before axle, testbed, drive and sensors."""
 
     wheel: Wheel
-    situation: Situation
+    situation: OnSoil
     balance: balance.Balance
 
 
@@ -99,7 +105,7 @@ def carried(
     effects = in_order(effects)
     wheel, situation, soil, law = touched(wheel, soil, motion, effects)
 
-    solved = _balance(wheel, soil, law, motion, situation, effects, near, order)
+    solved = _balance(wheel, soil, law, situation, effects, near, order)
     return Carried(wheel, situation, solved)
 
 
@@ -131,12 +137,16 @@ def carried_at(
 
 def touched(
     wheel: Wheel, soil: Soil, motion: Motion, effects: Sequence[Effect]
-) -> tuple[Wheel, Situation, Soil, ContactLaw]:
+) -> tuple[Wheel, OnSoil, Soil, ContactLaw]:
     """The true wheel, its situation, the soil under it and the contact, effects in order."""
-    wheel, situation = prepare(wheel, motion, effects)
-    soil = reduce(lambda soil, e: e.soil(soil, situation), effects, soil)
-    situation = replace(
-        situation, cohesion=soil.cohesion, tan_phi=soil.tan_phi, shear_modulus=soil.shear_modulus
+    wheel, moving = prepare(wheel, motion, effects)
+    soil = reduce(lambda soil, e: e.soil(soil, moving), effects, soil)
+    situation = advanced(
+        OnSoil,
+        moving,
+        cohesion=soil.cohesion,
+        tan_phi=soil.tan_phi,
+        shear_modulus=soil.shear_modulus,
     )
     law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
     return wheel, situation, soil, law
@@ -154,26 +164,25 @@ def responded(
     """
     effects = in_order(effects)
     situation, reaction = felt(solved, effects, correction)
-    situation, motor_torque = drive(
+    driven, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
 
-    return _response(situation, solved.balance, reaction, motor_torque, effects)
+    return _response(driven, solved.balance, reaction, motor_torque, effects)
 
 
 def felt(
     solved: Carried, effects: Sequence[Effect], correction: Correction | None = None
-) -> tuple[Situation, Reaction]:
+) -> tuple[Balanced, Reaction]:
     """The situation under the balance, and what axle and testbed make of it, before drive and
     sensors.
     """
-    balanced = solved.balance
-    situation = loaded(solved.situation, solved.wheel, balanced.theta_1, balanced.forces)
+    situation = balanced(solved.situation, solved.wheel, solved.balance)
     return situation, corrected_form(react(situation, in_order(effects)), situation, correction)
 
 
 def _response(
-    situation: Situation,
+    situation: Complete,
     solved: balance.Balance,
     reaction: Reaction,
     motor_torque: Scalar,
@@ -215,16 +224,16 @@ def paper_contact(wheel: Wheel, situation: Situation) -> ContactLaw:
     return ContactLaw(theta_m_ratio=np.clip(wheel.c1 + wheel.c2 * situation.slip, 0.0, 1.0))
 
 
-def loaded(
-    situation: Situation, wheel: Wheel, theta_1: Scalar, forces: OriginalForces
-) -> Situation:
-    """The situation once the rim stresses are known, θ₁ (n,) [rad]; in reverse drawbar pull and
-    torque change sign.
+def balanced(situation: OnSoil, wheel: Wheel, solved: balance.Balance) -> Balanced:
+    """The situation once the rim stresses are known; in reverse drawbar pull and torque change
+    sign.
     """
-    return replace(
+    forces = solved.forces
+    return advanced(
+        Balanced,
         situation,
-        theta_1=theta_1,
-        sinkage=2.0 * wheel.radius * np.sin(0.5 * theta_1) ** 2,
+        theta_1=solved.theta_1,
+        sinkage=2.0 * wheel.radius * np.sin(0.5 * solved.theta_1) ** 2,
         carried=forces.load,
         torque=forces.torque * situation.direction,
         drawbar_pull=forces.drawbar_pull * situation.direction,
@@ -232,7 +241,7 @@ def loaded(
     )
 
 
-def react(situation: Situation, effects: Sequence[Effect]) -> Reaction:
+def react(situation: Balanced, effects: Sequence[Effect]) -> Reaction:
     """What the axle and then the testbed's sensors feel."""
     reaction = Reaction(
         situation.drawbar_pull,
@@ -262,8 +271,8 @@ def corrected_form(
 
 
 def drive(
-    situation: Situation, effects: Sequence[Effect], torque_constant: float
-) -> tuple[Situation, Scalar]:
+    situation: Balanced, effects: Sequence[Effect], torque_constant: float
+) -> tuple[Complete, Scalar]:
     """Motor current for the axle torque of the situation, and motor torque behind it (n,) [N·m].
 
     The factor on the torque constant may depend on the current itself (heating), hence the rounds.
@@ -272,17 +281,17 @@ def drive(
         lambda torque, e: torque + e.torque_loss(situation), effects, situation.torque
     )
 
-    situation = replace(situation, current=motor_torque / torque_constant)
+    driven = advanced(Complete, situation, current=motor_torque / torque_constant)
     for _ in range(HEATING_ROUNDS):
-        current = motor_torque / (torque_constant * torque_factor(situation, effects))
-        settled = np.allclose(current, situation.current, rtol=1e-9, atol=1e-12)
-        situation = replace(situation, current=current)
+        current = motor_torque / (torque_constant * torque_factor(driven, effects))
+        settled = np.allclose(current, driven.current, rtol=1e-9, atol=1e-12)
+        driven = replace(driven, current=current)
         if settled:
             break
-    return situation, motor_torque
+    return driven, motor_torque
 
 
-def torque_factor(situation: Situation, effects: Sequence[Effect]) -> Scalar:
+def torque_factor(situation: Powered, effects: Sequence[Effect]) -> Scalar:
     """True over configured torque constant (n,), all effects together."""
     factor: Scalar = 1.0
     for effect in effects:
@@ -290,13 +299,13 @@ def torque_factor(situation: Situation, effects: Sequence[Effect]) -> Scalar:
     return factor
 
 
-def axle_torque(situation: Situation, effects: Sequence[Effect], torque_constant: float) -> Scalar:
+def axle_torque(situation: Powered, effects: Sequence[Effect], torque_constant: float) -> Scalar:
     """Axle torque (n,) [N·m] behind the situation's true current: the exact inverse of `drive`."""
     torque = torque_constant * torque_factor(situation, effects) * situation.current
     return reduce(lambda torque, e: torque - e.torque_loss(situation), effects, torque)
 
 
-def corrected(sensed: Sensed, situation: Situation, effects: Sequence[Effect]) -> Sensed:
+def corrected(sensed: Sensed, situation: Loaded, effects: Sequence[Effect]) -> Sensed:
     """True values behind the readings: sensor effects undone in reverse order."""
     return reduce(
         lambda sensed, e: e.correct(sensed, situation), reversed(in_order(effects)), sensed
@@ -307,30 +316,27 @@ def _balance(
     wheel: Wheel,
     soil: Soil,
     law: ContactLaw,
-    motion: Motion,
-    situation: Situation,
+    situation: OnSoil,
     effects: Sequence[Effect],
     near: balance.Balance | None,
     order: int,
 ) -> balance.Balance:
     n = np.broadcast_shapes(
-        np.shape(motion.time), np.shape(situation.load), np.shape(situation.slip)
+        np.shape(situation.time), np.shape(situation.load), np.shape(situation.slip)
     )
 
     def solve(load: Scalar, start: balance.Balance | None) -> balance.Balance:
         contact = balance.Contact(soil, law, situation.slip, _full(load, n))
         return balance.solve(wheel, contact, start, order)
 
-    def felt(situation: Situation) -> Scalar:
+    def felt(situation: OnSoil) -> Scalar:
         return reduce(lambda load, e: e.load(load, situation), effects, situation.load)
 
-    if motion.sinkage is not None:
-        return solve(felt(replace(situation, sinkage=motion.sinkage)), near)
-    if not any(e.needs_sinkage for e in effects):
+    if situation.sinkage is not None or not any(e.needs_sinkage for e in effects):
         return solve(felt(situation), near)
 
     predicted = solve(situation.load, near)
-    load = felt(loaded(situation, wheel, predicted.theta_1, predicted.forces))
+    load = felt(balanced(situation, wheel, predicted))
     return predicted if np.all(load == situation.load) else solve(load, predicted)
 
 

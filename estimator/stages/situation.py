@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gritd.estimator.stages.history import rate_of
 from gritd.estimator.terramechanics.original import Mobilisation, janosi
 from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
+S = TypeVar("S", bound="Situation")
 Recall = tuple[float, ...]  # what one effect remembers
 
 HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
@@ -44,41 +46,66 @@ class Motion:
     run: Scalar = 0.0  # number of the run, where several stand one after another
 
 
-@dataclass(frozen=True)
-class Situation:
-    """What an effect may know of the wheel. Below a comment, fields hold 0 until that stage."""
+@dataclass(frozen=True, kw_only=True)
+class Situation(Motion):
+    """A wheel of true radius in true motion: what the soil's effects may know. Each stage adds what
+    it computes, in a type of its own; an attribute that is not there yet raises AttributeError.
+    """
 
-    time: Scalar  # [s]
-    wheel_angle: Scalar  # [rad]
-    wheel_speed: Scalar  # ω [rad/s]
     wheel_acceleration: Scalar  # dω/dt [rad/s²]
-    carriage_speed: Scalar  # v [m/s]
     position: Scalar  # on the bed [m]
-    pass_number: Scalar
+    travel: Scalar  # away from where the run began [m]
     radius: Scalar  # r [m]
     width: float  # b [m]
     slip: Scalar  # i [-], positive when driving, in the direction of travel
     direction: Scalar  # +1 forward, −1 backward, 0 at rest; smooth in between
-    load: Scalar  # weights on the axle [N]
-    temperature: Scalar | None = None  # [°C]
-    travel: Scalar = 0.0  # away from where the run began [m]
-    run: Scalar = 0.0  # number of the run, where several stand one after another
-    # the soil stage
-    cohesion: Scalar = 0.0  # c [Pa]
-    tan_phi: Scalar = 0.0
-    shear_modulus: Scalar = 0.0  # k [m]
-    # the vertical balance
-    theta_1: Scalar = 0.0  # [rad]
-    sinkage: Scalar = 0.0  # z [m], positive down
-    sinking: Scalar = 0.0  # dz/dt [m/s], on line only
-    carried: Scalar = 0.0  # vertical force of the soil W [N]
-    torque: Scalar = 0.0  # at the axle [N·m]
-    drawbar_pull: Scalar = 0.0  # DP [N]
+    # on line
+    sinking: Scalar = 0.0  # dz/dt [m/s]
+    memory: Mapping[str, Recall] = field(default_factory=dict)  # of the effects, by their names
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnSoil(Situation):
+    """With the soil under the wheel: for contact and load."""
+
+    cohesion: Scalar  # c [Pa]
+    tan_phi: Scalar
+    shear_modulus: Scalar  # k [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loaded(OnSoil):
+    """With the vertical force of the soil: for sensors, and what the drive loses."""
+
+    sinkage: Scalar  # z [m], positive down
+    carried: Scalar  # W [N]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balanced(Loaded):
+    """With the forces of the vertical balance: for wheel and testbed."""
+
+    theta_1: Scalar  # [rad]
+    torque: Scalar  # at the axle [N·m]
+    drawbar_pull: Scalar  # DP [N]
     side_force: Scalar = 0.0  # of the soil, across the wheel [N]
-    # the drivetrain
-    current: Scalar = 0.0  # [A]
-    # on line: what an effect remembers, by its name
-    memory: Mapping[str, Recall] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Powered(Loaded):
+    """With the motor's current: for its torque constant. On line it is known before the torque."""
+
+    current: Scalar  # [A]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Complete(Balanced, Powered):
+    """With all of it."""
+
+
+def advanced(stage: type[S], situation: Motion, **values: Any) -> S:
+    """The situation at a later stage, with what that has computed."""
+    return stage(**{**vars(situation), **values})
 
 
 @dataclass(frozen=True)
@@ -125,22 +152,16 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
     if acceleration is None:
         acceleration = rate_of(motion.time, motion.wheel_speed)
 
-    return Situation(
-        time=motion.time,
-        wheel_angle=motion.wheel_angle,
-        wheel_speed=motion.wheel_speed,
+    return advanced(
+        Situation,
+        motion,
         wheel_acceleration=acceleration,
-        carriage_speed=motion.carriage_speed,
         position=motion.start_position + motion.carriage_position,
-        pass_number=motion.pass_number,
+        travel=np.abs(motion.carriage_position),
         radius=wheel.radius,
         width=wheel.width,
         slip=slip,
         direction=direction,
-        load=motion.load,
-        temperature=motion.temperature,
-        travel=np.abs(motion.carriage_position),
-        run=motion.run,
     )
 
 

@@ -18,7 +18,17 @@ from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects import in_order, make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import axle_torque, corrected, paper_contact, prepare, react
-from gritd.estimator.stages.situation import Motion, Recall, Sensed, Situation
+from gritd.estimator.stages.situation import (
+    Complete,
+    Loaded,
+    Motion,
+    OnSoil,
+    Powered,
+    Recall,
+    Sensed,
+    Situation,
+    advanced,
+)
 from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
 from gritd.estimator.wheel.form import NAME as FORM
 from gritd.estimator.wheel.form import FormOnLine
@@ -82,7 +92,7 @@ class Undone(NamedTuple):
     load_doubt: float  # standard deviation by what effects make of it
     drawbar_pull: float  # [N]
     here: Here
-    situation: Situation
+    situation: Complete
 
 
 class Chain:
@@ -104,7 +114,7 @@ class Chain:
         """Undo the sensor and drivetrain effects of a window and work out the others; load: W
         measured or assumed.
         """
-        wheel, situation = self._situation(snapshot, load, context)
+        as_read = self._situation(snapshot, load, context)
         read = Sensed(
             snapshot.sinkage.value,
             snapshot.current.value,
@@ -113,15 +123,18 @@ class Chain:
             snapshot.axle_torque.value,
         )
 
-        true = corrected(read, situation, self.effects)
-        carried = self._carried(float(true.load), situation)
-        situation = replace(situation, current=true.current, carried=carried, sinkage=true.sinkage)
-        torque = self._torque(true, situation)
-        situation = replace(
-            situation,
+        true = corrected(read, as_read, self.effects)
+        carried = self._carried(float(true.load), as_read)
+        powered = advanced(
+            Powered, as_read, current=true.current, carried=carried, sinkage=true.sinkage
+        )
+        torque = self._torque(true, powered)
+        situation = advanced(
+            Complete,
+            powered,
             torque=torque,
             drawbar_pull=true.drawbar_pull,
-            theta_1=entry_angle(wheel.radius, float(true.sinkage)).value,
+            theta_1=entry_angle(self.wheel.radius, float(true.sinkage)).value,
         )
 
         felt = react(situation, self.effects)
@@ -142,7 +155,7 @@ class Chain:
         )
 
     def felt(
-        self, situation: Situation, torque: float, pull: float, soil: tuple[float, float, float]
+        self, situation: Complete, torque: float, pull: float, soil: tuple[float, float, float]
     ) -> tuple[float, float]:
         """Axle torque [N·m] and drawbar pull [N] where the rim gives `torque` and `pull` in a soil
         (c, tan φ, k).
@@ -160,7 +173,7 @@ class Chain:
         reaction = react(situation, self.effects)
         return float(reaction.torque), float(reaction.drawbar_pull)
 
-    def _carried(self, load: float, situation: Situation) -> float:
+    def _carried(self, load: float, situation: Loaded) -> float:
         """W on the soil: as measured, or what the effects leave of the weights."""
         if self._settings.wrench is not None:
             return load
@@ -169,23 +182,21 @@ class Chain:
             carried = effect.load(carried, situation)
         return float(carried)
 
-    def _answered(self, situation: Situation, load: Scalar) -> tuple[float, float]:
+    def _answered(self, situation: Complete, load: Scalar) -> tuple[float, float]:
         """Slip and load [N] that the stresses on the rim answer to."""
         slip: Scalar = situation.slip
         for effect in self.effects:
             slip, load = effect.answered(slip, load, situation)
         return float(slip), float(load)
 
-    def _torque(self, true: Sensed, situation: Situation) -> float:
+    def _torque(self, true: Sensed, situation: Powered) -> float:
         if self._settings.drive.torque_source != "motor_shunt":
             return float(true.torque)
         return float(
             axle_torque(situation, self.effects, self._settings.drive.torque_constant.value)
         )
 
-    def _situation(
-        self, snapshot: Snapshot, load: float, context: Context
-    ) -> tuple[Wheel, Situation]:
+    def _situation(self, snapshot: Snapshot, load: float, context: Context) -> Loaded:
         motion = Motion(
             time=context.time,
             wheel_angle=snapshot.wheel_angle,
@@ -199,8 +210,9 @@ class Chain:
             wheel_acceleration=context.acceleration,
             sinkage=snapshot.sinkage.value,
         )
-        wheel, situation = prepare(self._settings.wheel, motion, self.effects)
-        situation = replace(
+        _, situation = prepare(self._settings.wheel, motion, self.effects)
+        return advanced(
+            Loaded,
             situation,
             memory=context.memory,
             sinking=context.sinking,
@@ -210,9 +222,7 @@ class Chain:
             carried=load,
         )
 
-        return wheel, situation
-
-    def _here(self, situation: Situation, context: Context) -> Here:
+    def _here(self, situation: OnSoil, context: Context) -> Here:
         """Slope and offset of each soil parameter through the soil and contact effects."""
         law = reduce(
             lambda law, e: e.contact(law, situation),
@@ -239,7 +249,7 @@ class Chain:
         return reduce(lambda soil, e: e.soil(soil, situation), self.effects, soil)
 
     def remember(
-        self, memory: Mapping[str, Recall], step: float, situation: Situation
+        self, memory: Mapping[str, Recall], step: float, situation: Complete
     ) -> dict[str, Recall]:
         """What the effects remember, `step` [s] later."""
         return {

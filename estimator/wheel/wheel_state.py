@@ -13,7 +13,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import ENCODERS, MOTION, NS
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Complete
 from gritd.estimator.terramechanics.soil import Wheel
 from gritd.estimator.wheel.chain import Added, Chain, Context, Here
 from gritd.estimator.wheel.form import NAME, FormHere, FormOnLine, Wheeling
@@ -78,7 +78,7 @@ class WheelState(NamedTuple):
     here: Here | None = None
     # ∂(T, DP) by each uncertain effect parameter, in its σ
     by_parameters: tuple[tuple[float, float], ...] = ()
-    situation: Situation | None = None
+    situation: Complete | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
     grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`
     doubts: tuple[float, float] = (0.0, 0.0)  # σ of slip and load [N] by what lags: no noise

@@ -5,6 +5,7 @@ says it shows.
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,18 @@ from gritd.estimator.config.units import unit
 from gritd.estimator.effects import EFFECTS, in_order, make
 from gritd.estimator.effects.base import EXPERIMENTS, STAGES, Effect, Parameter
 from gritd.estimator.model.forward import Response, corrected, simulate_arrays
-from gritd.estimator.stages.situation import Motion, Sensed, Situation, situation_of
+from gritd.estimator.stages.situation import (
+    Balanced,
+    ContactLaw,
+    Motion,
+    Powered,
+    Sensed,
+    advanced,
+    situation_of,
+)
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, ramped, shown, typical
+from tests.rig import BALANCED
 
 NAMES = sorted(EFFECTS)
 FORWARD = [name for name in NAMES if not EFFECTS[name].filter_only]
@@ -238,7 +248,9 @@ def test_correction_undoes_the_sensor(name: str) -> None:
     true = Sensed(
         *(np.linspace(0.1, 2.0, np.size(motion.time)) * k for k in (0.01, 1.0, 5.0, 40.0, 1.0))
     )
-    situation = replace(situation_of(motion, WHEEL), carried=true.load)
+    situation = advanced(
+        Balanced, situation_of(motion, WHEEL), **{**BALANCED, "carried": true.load}
+    )
     back = corrected(effect.sensors(true, situation), situation, (effect,))
     for f in fields(true):
         np.testing.assert_allclose(getattr(back, f.name), getattr(true, f.name), rtol=1e-12)
@@ -248,7 +260,8 @@ def test_latency_is_undone_away_from_the_ends() -> None:
     effect = make("sensor_latency", {"sinkage": 0.3, "current": 0.2, "force": 0.4})
     time = np.arange(500) / 25.0
     true = Sensed(*(np.sin(time / k) for k in (2.0, 3.0, 4.0, 5.0, 6.0, 7.0)))
-    situation = replace(situation_of(campaign(1)[0], WHEEL), time=time)
+    moving = replace(situation_of(campaign(1)[0], WHEEL), time=time)
+    situation = advanced(Balanced, moving, **BALANCED)
     back = corrected(effect.sensors(true, situation), situation, (effect,))
     for f in fields(true):
         np.testing.assert_allclose(
@@ -260,18 +273,15 @@ def test_latency_is_undone_away_from_the_ends() -> None:
 def test_takes_floats_as_the_loop_has_them(name: str) -> None:
     """Every hook that the on-line filter may call gives one number for one instant."""
     effect = typical(EFFECTS[name])
-    memory = {name: (0.3, 60.0)}
-    situation = Situation(
-        *(1.0, 2.0, 0.3, 0.1, 0.015, 0.4, 2.0, 0.072, 0.071, 0.2, 1.0, 60.0),
-        **dict(
-            theta_1=0.8,
-            sinkage=0.02,
-            carried=60.0,
-            torque=2.0,
-            drawbar_pull=3.0,
-            current=1.0,
-            memory=memory,
-        ),
+    motion = Motion(1.0, 2.0, 0.3, 0.4, 0.015, 60.0, pass_number=2.0, wheel_acceleration=0.1)
+    known = {key: BALANCED[key] for key in ("cohesion", "tan_phi", "shear_modulus", "carried")}
+    situation = advanced(
+        Powered,
+        situation_of(motion, WHEEL),
+        **known,
+        sinkage=0.02,
+        current=1.0,
+        memory={name: (0.3, 60.0)},
     )
     for value in (
         effect.torque_loss(situation),
@@ -286,6 +296,17 @@ def test_takes_floats_as_the_loop_has_them(name: str) -> None:
     assert all(
         np.ndim(getattr(value, f.name)) == 0 for value in (soil, sensed) for f in fields(value)
     )
+
+
+def test_what_a_later_stage_computes_cannot_be_read() -> None:
+    class TooEarly(Effect):
+        stage = "contact"
+
+        def contact(self, law: ContactLaw, situation: Any) -> ContactLaw:
+            return replace(law, strength=1.0 + situation.torque)
+
+    with pytest.raises(AttributeError, match=r"OnSoil.*torque"):
+        simulate_arrays(WHEEL, SOIL, campaign(1)[0], (TooEarly(),))
 
 
 def test_configuration_errors_are_one_line() -> None:

@@ -16,15 +16,18 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.model import balance, forward
 from gritd.estimator.model.balance import Contact
 from gritd.estimator.stages.situation import (
+    Balanced,
+    Complete,
     ContactLaw,
     Motion,
-    Situation,
+    advanced,
     signed_slip,
     situation_of,
 )
 from gritd.estimator.terramechanics.original import forces
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, typical
+from tests.rig import BALANCED
 
 LOOSE = Soil(cohesion=700.0, tan_phi=0.6, shear_modulus=0.015, exponent=0.8, modulus=2.1e5)
 BIG = Wheel(radius=0.15, width=0.15)
@@ -238,10 +241,9 @@ def test_axle_torque_is_the_exact_inverse_of_drive() -> None:
         typical(EFFECTS[name])
         for name in (*DRIVETRAIN, "viscous_friction", "torque_constant_error")
     )
-    situation = situation_of(campaign(1)[0], WHEEL)
-    situation, _ = forward.drive(
-        Situation(**{**vars(situation), "torque": 2.0 + situation.slip}), effects, 2.0
-    )
+    moving = situation_of(campaign(1)[0], WHEEL)
+    balanced = advanced(Balanced, moving, **{**BALANCED, "torque": 2.0 + moving.slip})
+    situation, _ = forward.drive(balanced, effects, 2.0)
     np.testing.assert_allclose(
         forward.axle_torque(situation, effects, 2.0), 2.0 + situation.slip, atol=1e-6
     )
@@ -265,27 +267,21 @@ def test_a_float_instant_gives_what_the_array_gives() -> None:
         ),
         WHEEL,
     )
-    assert forward.axle_torque(
-        Situation(**{**vars(one), "current": 1.5}), effects, 2.0
-    ) == pytest.approx(
-        forward.axle_torque(
-            Situation(**{**vars(whole), "current": np.full(50, 1.5)}), effects, 2.0
-        )[10]
-    )
+    alone, among = (advanced(Complete, each, **BALANCED, current=1.5) for each in (one, whole))
+    torque = forward.axle_torque(among, effects, 2.0)
+    assert forward.axle_torque(alone, effects, 2.0) == pytest.approx(torque[10])
 
 
 def test_heating_on_line_follows_the_batch() -> None:
     effect = make("motor_heating", {"fall": 0.5, "duration": 5.0})
     current = 1.0 + np.sin(np.arange(300) / 20.0)
-    situation = Situation(**{**vars(situation_of(steady(n=300), WHEEL)), "current": current})
+    situation = advanced(Complete, situation_of(steady(n=300), WHEEL), **BALANCED, current=current)
     batch = effect.torque_factor(situation)
     memory, live = (0.0,), []
     for now in current:
-        at = Situation(**{**vars(situation), "current": now, "memory": {effect.name: memory}})
+        at = replace(situation, current=now, memory={effect.name: memory})
         memory = effect.remember(memory, 0.04, at)
-        live.append(
-            effect.torque_factor(Situation(**{**vars(at), "memory": {effect.name: memory}}))
-        )
+        live.append(effect.torque_factor(replace(at, memory={effect.name: memory})))
     np.testing.assert_allclose(live[1:], batch[1:], rtol=0.01)
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,8 +27,8 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.limits import limits, raised
 from gritd.estimator.model.forward import drive
-from gritd.estimator.stages.situation import Sensed, Situation
-from gritd.estimator.terramechanics.soil import Array
+from gritd.estimator.stages.situation import Balanced, Motion, Sensed, advanced, situation_of
+from gritd.estimator.terramechanics.soil import Array, Wheel
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
 from gritd.tools.diagnose.orders.latency import Latency
@@ -42,6 +42,10 @@ from gritd.tools.diagnose.tuning import TUNING
 EFFECTS_OF_A_DRIVE = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple",
     "motor_heating", "current_offset", "sensor_latency",
+)  # fmt: skip
+# what is nothing without soil
+OF_SOIL = (
+    "cohesion", "tan_phi", "shear_modulus", "sinkage", "carried", "theta_1", "drawbar_pull",
 )  # fmt: skip
 UNITS = {
     "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad",
@@ -158,23 +162,19 @@ class DriveRig:
     ) -> Array:
         """As the current tells it, on the fine grid [N·m]."""
         zero = np.zeros(motion.time.size)
-        situation = Situation(
-            time=motion.time,
-            wheel_angle=motion.angle,
-            wheel_speed=motion.velocity / self.usual,
-            wheel_acceleration=motion.acceleration,
-            carriage_speed=zero,
-            position=motion.angle,
-            pass_number=1.0,
-            radius=1.0,
-            width=1.0,
-            slip=zero,
-            direction=np.sign(motion.velocity),
-            load=zero,
-        )
-
         torque = inertia * motion.acceleration + damping * motion.velocity
-        situation, _ = drive(replace(situation, torque=torque), effects, 1.0)
+        turning = Motion(
+            motion.time,
+            motion.angle,
+            motion.velocity / self.usual,
+            carriage_position=motion.angle,
+            carriage_speed=zero,
+            load=zero,
+            wheel_acceleration=motion.acceleration,
+        )
+        lifted = situation_of(turning, Wheel(radius=1.0, width=1.0))
+        off_soil = advanced(Balanced, lifted, **dict.fromkeys(OF_SOIL, 0.0), torque=torque)
+        situation, _ = drive(off_soil, effects, 1.0)
 
         sensed = Sensed(zero, situation.current, zero, zero, torque)
         for effect in effects:

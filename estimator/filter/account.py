@@ -89,14 +89,14 @@ def soil_estimate(estimate: Estimate) -> SoilEstimate:
     )
 
 
-def predictions(measurement: Measurement, account: Account) -> Predictions:
+def predictions(measurement: Measurement, state: TrackState, account: Account) -> Predictions:
     """What the estimate says of this window; NaN where the wheel touches nothing."""
     if not account.touching:
         return NO_PREDICTIONS
 
     now, estimate = account.now, account.estimate
     prediction = measurement.predict(estimate, now)
-    shared = measurement.shared(now, prediction)
+    shared = measurement.shared(now, prediction, state.by_parameters)
     torque, pull = measurement.expected(estimate, prediction, shared)
     torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(
         estimate, now, prediction, shared

@@ -6,7 +6,7 @@ from math import hypot
 from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate, Matrix, Update, Vector, dot
-from gritd.estimator.filter.measurement import Measurement
+from gritd.estimator.filter.measurement import ByParameters, Measurement
 from gritd.estimator.wheel.wheel_state import WheelState
 
 
@@ -48,11 +48,13 @@ class Line(NamedTuple):
         return Line(y, H, R, D, share)
 
 
-def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
+def line_of(
+    measurement: Measurement, mean: WheelState, by_parameters: ByParameters, x: Vector
+) -> Line:
     """The mean state of a stretch, along the tangent at the vector x (d,)."""
     estimate = Estimate(x, b"")
     prediction = measurement.predict(estimate, mean)
-    update = measurement.linearise(mean, prediction, estimate)
+    update = measurement.linearise(mean, prediction, estimate, by_parameters)
     y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
 
     # what lags is not off by its slip alone: torque and pull each have their own error

@@ -45,7 +45,8 @@ from gritd.estimator.wheel.wheel_state import WheelState, wheel_state, wheeling
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
-ByParameters = tuple[tuple[float, float], ...]  # ∂(T, DP) by each uncertain effect parameter
+# ∂(T, DP) by each uncertain effect parameter, in its σ
+ByParameters = tuple[tuple[float, float], ...]
 
 
 class Shared(NamedTuple):
@@ -71,7 +72,8 @@ class Measurement:
         self.nuisances = nuisances(settings)
 
         self._variants = _variants(settings)
-        self._unmoved = ((0.0, 0.0),) * len(self._variants)
+        # before the first update
+        self.unmoved: ByParameters = ((0.0, 0.0),) * len(self._variants)
         pulls = settings.wrench is not None and settings.wrench.pulls
         turns = settings.drive.torque_source != "none"
         # which of COMPONENTS are measured on this rig
@@ -113,14 +115,9 @@ class Measurement:
         first = STATES + len(self.nuisances) + len(self._variants)
         return slice(first, first + directions_of(self.settings))
 
-    def state(
-        self, snapshot: Snapshot, context: Context, estimate: Estimate, known: ByParameters
-    ) -> WheelState:
-        """The window in the wheel's own terms, effects accounted for; known: the derivatives by the
-        effects' parameters, of the last update.
-        """
-        now = self._sensed(self.model, self.chain, snapshot, context, estimate)
-        return now._replace(by_parameters=known or self._unmoved) if self._variants else now
+    def state(self, snapshot: Snapshot, context: Context, estimate: Estimate) -> WheelState:
+        """The window in the wheel's own terms, effects accounted for."""
+        return self._sensed(self.model, self.chain, snapshot, context, estimate)
 
     def by_parameters(
         self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate
@@ -141,10 +138,12 @@ class Measurement:
         """T, DP and resistance of the equations at the estimate, in this window's geometry."""
         return self._predicted(self.model, estimate, now)
 
-    def shared(self, now: WheelState, prediction: ForcePrediction) -> Shared:
+    def shared(
+        self, now: WheelState, prediction: ForcePrediction, by_parameters: ByParameters
+    ) -> Shared:
         """How a prediction follows the errors that all windows share."""
         sensitivity = _sensitivity(now, prediction)
-        return Shared(sensitivity, *self._shared_gradients(sensitivity, now))
+        return Shared(sensitivity, *self._shared_gradients(sensitivity, now, by_parameters))
 
     def expected(
         self, estimate: Estimate, prediction: ForcePrediction, shared: Shared
@@ -184,10 +183,16 @@ class Measurement:
         lagging = form.remember(wheeling(now, snapshot.wheel_angle), recall.get(NAME, ()))
         return {**after, NAME: lagging}
 
-    def linearise(self, now: WheelState, prediction: ForcePrediction, estimate: Estimate) -> Update:
+    def linearise(
+        self,
+        now: WheelState,
+        prediction: ForcePrediction,
+        estimate: Estimate,
+        by_parameters: ByParameters,
+    ) -> Update:
         """Innovation, H and R of the components that are measured."""
         torque, pull = prediction.torque, prediction.drawbar_pull
-        sensitivity, by_torque, by_pull = self.shared(now, prediction)
+        sensitivity, by_torque, by_pull = self.shared(now, prediction, by_parameters)
         x = self._without_stresses(estimate.x)
 
         update = Update(
@@ -215,11 +220,13 @@ class Measurement:
                 kept[at] = 0.0
         return tuple(kept[STATES:])
 
-    def _shared_gradients(self, s: Sensitivity, now: WheelState) -> tuple[Vector, Vector]:
+    def _shared_gradients(
+        self, s: Sensitivity, now: WheelState, by_parameters: ByParameters
+    ) -> tuple[Vector, Vector]:
         """Of T and DP (q,) each: by the calibration, the effects' parameters, the learnt
         discrepancy, and the error of form.
         """
-        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *now.by_parameters]
+        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *by_parameters]
         if now.form is not None:
             columns += [_felt(column, s) for column in now.form.columns]
 

@@ -11,7 +11,7 @@ from math import nan
 from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate
-from gritd.estimator.filter.measurement import Measurement
+from gritd.estimator.filter.measurement import ByParameters, Measurement
 from gritd.estimator.filter.model import ForcePrediction
 from gritd.estimator.wheel.wheel_state import WheelState
 
@@ -36,6 +36,7 @@ class Search(NamedTuple):
 
     estimate: Estimate
     now: WheelState
+    by_parameters: ByParameters
     pulls: tuple[float, ...] = ()
 
 
@@ -46,7 +47,7 @@ def search_on(measurement: Measurement, search: Search, known: Pull) -> tuple[Se
         return search._replace(pulls=(*search.pulls, prediction.drawbar_pull.value)), known
     best = best_slip(search.pulls)
     there, prediction = _at(measurement, search, best)
-    shared = measurement.shared(there, prediction)
+    shared = measurement.shared(there, prediction, search.by_parameters)
     _, sigma, _ = measurement.sigmas(search.estimate, there, prediction, shared)
     return None, Pull(prediction.drawbar_pull.value, sigma, best)
 

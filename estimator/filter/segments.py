@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 from gritd.estimator.filter.bank import Bank
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
+from gritd.estimator.filter.measurement import ByParameters
 from gritd.estimator.filter.tuning import CHANGE
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.wheel.chain import Added, Here
@@ -49,6 +50,7 @@ class Stretch(NamedTuple):
     """
 
     mean: WheelState
+    by_parameters: ByParameters  # likewise the mean
     windows: int
     components: tuple[int, ...]
     elapsed: float  # [s] since the end of the stretch before
@@ -61,22 +63,23 @@ class Stretch(NamedTuple):
         """Whether it tells of the soil: a window or two are outliers, or part of a transition."""
         return self.windows >= STEADY
 
-    def like(self, now: WheelState, components: tuple[int, ...]) -> bool:
-        """Whether a window is of the same condition."""
-        mean = self.mean
+    def like(self, other: Stretch) -> bool:
+        """Whether another is of the same condition."""
+        mean, now = self.mean, other.mean
         return (
-            components == self.components
+            other.components == self.components
             and abs(now.slip.value - mean.slip.value) <= SAME_SLIP
             and abs(now.load.value - mean.load.value) <= SAME_LOAD * mean.load.value
             and abs(now.theta_1.value - mean.theta_1.value) <= SAME_ANGLE * mean.theta_1.value
         )
 
-    def merged(self, now: WheelState, radius: float, elapsed: float, windows: int = 1) -> Stretch:
-        """The stretch with one more window, or several. Sigmas stay those of a single window; that
+    def merged(self, after: Stretch, radius: float) -> Stretch:
+        """This stretch and the next, or one more window. Sigmas stay those of a single window; that
         of slip is what it would be if the windows were independent.
         """
-        weight = windows / (self.windows + windows)
-        old = self.mean
+        windows = self.windows + after.windows
+        weight = after.windows / windows
+        old, now = self.mean, after.mean
 
         def mean(a: Measured, b: Measured) -> Measured:
             return Measured(a.value + (b.value - a.value) * weight, a.sigma)
@@ -96,22 +99,20 @@ class Stretch(NamedTuple):
             added=old.added and now.added and Added(*_blend(old.added, now.added, weight)),
             here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
             form=old.form and now.form and old.form.mixed(now.form, weight),
-            by_parameters=tuple(
-                _blend(a, b, weight)
-                for a, b in zip(old.by_parameters, now.by_parameters, strict=True)
-            ),
         )
+        columns = zip(self.by_parameters, after.by_parameters, strict=True)
         return self._replace(
             mean=state,
-            windows=self.windows + windows,
-            elapsed=self.elapsed + elapsed,
+            by_parameters=tuple([_blend(a, b, weight) for a, b in columns]),
+            windows=windows,
+            elapsed=self.elapsed + after.elapsed,
             line=None,
         )
 
     def joined(self, after: Stretch, radius: float) -> Stretch:
         """This stretch and the next, both complete, as one."""
         assert self.line is not None and after.line is not None
-        both = self.merged(after.mean, radius, after.elapsed, after.windows)
+        both = self.merged(after, radius)
         return both._replace(line=self.line.mixed(after.line, after.windows / both.windows))
 
 
@@ -142,26 +143,19 @@ class Memory(NamedTuple):
         changes = [at for at, stretch in enumerate(self.stretches) if stretch.changed is not None]
         return changes[-1] if changes else 0
 
-    def extended(
-        self,
-        now: WheelState,
-        components: tuple[int, ...],
-        radius: float,
-        elapsed: float,
-        unrest: float,
-    ) -> tuple[Memory, bool]:
+    def extended(self, window: Stretch, radius: float) -> tuple[Memory, bool]:
         """The memory with one more window, and whether a new stretch began."""
-        elapsed += self.pending
+        window = window._replace(elapsed=window.elapsed + self.pending)
         if not self.stretches:
-            return self._begun((), Stretch(now, 1, components, elapsed, unrest)), True
+            return self._begun((), window), True
 
         *before, last = self.stretches
-        if not self.closed and last.windows < SHORTEST and last.like(now, components):
-            return self._begun(before, last.merged(now, radius, elapsed)), False
+        if not self.closed and last.windows < SHORTEST and last.like(window):
+            return self._begun(before, last.merged(window, radius)), False
 
-        kept = [*before, last] if last.judged or self.closed else before
-        elapsed += 0.0 if last.judged or self.closed else last.elapsed
-        return self._begun(kept, Stretch(now, 1, components, elapsed, unrest)), True
+        if last.judged or self.closed:
+            return self._begun(self.stretches, window), True
+        return self._begun(before, window._replace(elapsed=window.elapsed + last.elapsed)), True
 
     def _begun(self, before: Sequence[Stretch], last: Stretch) -> Memory:
         return Memory(self.anchor, (*before, last))
@@ -249,4 +243,4 @@ class Memory(NamedTuple):
 
 
 def _alike(left: Stretch, right: Stretch) -> bool:
-    return right.changed is None and left.like(right.mean, right.components)
+    return right.changed is None and left.like(right)

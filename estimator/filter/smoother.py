@@ -53,7 +53,7 @@ class Smoother:
         `base`.
         """
         *before, last = memory.stretches
-        last = last._replace(line=line_of(self._measurement, last.mean, x))
+        last = last._replace(line=self._tangent(last, x))
         last, bank = self._absorbed(base, last, doubt)
         return memory._replace(stretches=(*before, last)), bank
 
@@ -86,7 +86,10 @@ class Smoother:
 
     def tangents(self, stretches: Sequence[Stretch], x: Vector) -> tuple[Line, ...]:
         """Stretches along the tangents at x (3,)."""
-        return tuple([line_of(self._measurement, stretch.mean, x) for stretch in stretches])
+        return tuple([self._tangent(stretch, x) for stretch in stretches])
+
+    def _tangent(self, stretch: Stretch, x: Vector) -> Line:
+        return line_of(self._measurement, stretch.mean, stretch.by_parameters, x)
 
     def over(
         self, bank: Bank, stretches: Sequence[Stretch], doubt: float

@@ -77,7 +77,7 @@ class TrackState(NamedTuple):
     window: int  # [ns] length of a window
     choosing: bool  # whether that is one from which another length is to be chosen
     recall: Mapping[str, Recall]  # what configured effects remember, by name
-    by_parameters: ByParameters = ()  # ∂(T, DP) by uncertain effect parameters, at the last update
+    by_parameters: ByParameters  # of the last update
     linearised: Vector | None = None  # where the memory was linearised last
     unlinearised: int = 0  # windows since then
     began: int = -1  # end of the first window [ns]

@@ -31,7 +31,7 @@ from gritd.estimator.filter.estimate import (
 from gritd.estimator.filter.learnt_soil import with_learnt_soil
 from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.review import Reviewer
-from gritd.estimator.filter.segments import Memory
+from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.smoother import Smoother
 from gritd.estimator.filter.track import Task, TrackState, Withheld
 from gritd.estimator.filter.tuning import CHANGE, FORM, TRUST
@@ -92,6 +92,7 @@ class Tracker:
             window_at_first(self.settings),
             self.settings.rates.auto,
             self.measurement.chain.fresh_memory(),
+            self.measurement.unmoved,
         )
 
     def _unsure(self, factor: float = 1.0) -> Bank:
@@ -125,7 +126,7 @@ class Tracker:
             state = self.reviewed(state) if closes else self._concluded(self.reviewer.step(state))
 
         context = _context(state, snapshot, elapsed)
-        now = self.measurement.state(snapshot, context, state.estimate, state.by_parameters)
+        now = self.measurement.state(snapshot, context, state.estimate)
         started = state.started
         aids: tuple[Aid, ...] = ()
         if closes and snapshot.ready:
@@ -136,8 +137,7 @@ class Tracker:
         status = classify(self.settings, snapshot, now, state.steady, self._required, started)
         if closes and status == Status.TRACKING and not state.choosing:
             known = self.measurement.by_parameters(now, snapshot, context, state.estimate)
-            now = now._replace(by_parameters=known)
-            state, aids = self._update(state, now, elapsed)
+            state, aids = self._update(state._replace(by_parameters=known), now, elapsed)
 
         account = self._account(state, snapshot, now, status, aids)
         if aids and account.flags & Flag.PRIOR:
@@ -260,24 +260,23 @@ class Tracker:
         walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
 
         prediction = self.measurement.predict(walked, now)
-        aids = self._gate(walked, now, self.measurement.linearise(now, prediction, walked))
+        update = self.measurement.linearise(now, prediction, walked, state.by_parameters)
+        aids = self._gate(walked, now, update)
         taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
 
-        memory, begun = state.memory.extended(
-            now, taken, self.measurement.chain.wheel.radius, elapsed, trust.unrest
-        )
+        window = Stretch(now, state.by_parameters, 1, taken, elapsed, trust.unrest)
+        memory, begun = state.memory.extended(window, self.measurement.chain.wheel.radius)
         base = state.base if not begun or state.memory.dropped(memory) else state.bank
         memory, bank = self.smoother.with_open(memory, base, walked.x, trust.doubt)
         bank = self._bounds.all_inside(bank)
         estimate = reported(bank)
         trust = self._bounds.stood(trust, estimate, elapsed) if taken else trust
 
-        task = self._task(state, now, taken) if begun else None
+        task = self._task(state, window) if begun else None
         state = state._replace(
             estimate=estimate,
             base=base,
             bank=bank,
-            by_parameters=now.by_parameters,
             memory=memory,
             unlinearised=state.unlinearised + 1,
             trust=trust
@@ -289,12 +288,11 @@ class Tracker:
         )
         return (self._set_back(state) if task is None else state), aids
 
-    def _task(self, state: TrackState, now: WheelState, taken: tuple[int, ...]) -> Task | None:
+    def _task(self, state: TrackState, window: Stretch) -> Task | None:
         """The review that begins where a stretch has ended."""
         if not state.memory.stretches:
             return None
-        like = state.memory.stretches[-1].like(now, taken)
-        return self.reviewer.begun(like, state.unlinearised + 1)
+        return self.reviewer.begun(state.memory.stretches[-1].like(window), state.unlinearised + 1)
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate = self.settings.filter.gate

@@ -193,21 +193,22 @@ def _window(tracker: Tracker, state: TrackState, account: Account) -> BatchWindo
         ),
         measurements=measurements(snapshot, account.now),
         soil=soil_estimate(account.estimate),
-        predictions=_predictions(tracker, account),
+        predictions=_predictions(tracker, state, account),
         health=health(state, account),
         torque=torque,
         drawbar_pull=drawbar_pull,
     )
 
 
-def _predictions(tracker: Tracker, account: Account) -> PointPredictions:
+def _predictions(tracker: Tracker, state: TrackState, account: Account) -> PointPredictions:
     """At the estimate after the update."""
     if not account.touching:
         return PointPredictions()
 
     measurement, estimate, now = tracker.measurement, account.estimate, account.now
     prediction = measurement.predict(estimate, now)
-    torque, pull = measurement.expected(estimate, prediction, measurement.shared(now, prediction))
+    shared = measurement.shared(now, prediction, state.by_parameters)
+    torque, pull = measurement.expected(estimate, prediction, shared)
     return PointPredictions(
         torque_predicted=torque,
         drawbar_pull_predicted=pull,

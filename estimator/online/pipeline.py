@@ -73,7 +73,7 @@ class Pipeline:
         if search is not None:
             search, pull = search_on(self.tracker.measurement, search, pull)
         elif account.aids:
-            search = Search(account.estimate, account.now)
+            search = Search(account.estimate, account.now, track.by_parameters)
 
         first = t if state.first < 0 else state.first
         late, jumps = sync.counters.late, sync.counters.jumps
@@ -97,7 +97,7 @@ class Pipeline:
             head=self._head(before, after, account, consumed, t),
             measurements=measurements(account.snapshot, account.now),
             soil=soil_estimate(account.estimate),
-            predictions=predictions(self.tracker.measurement, account),
+            predictions=predictions(self.tracker.measurement, after.track, account),
             largest_pull=LargestPull(*after.pull),
             health=health(after.track, account),
             torque=torque,

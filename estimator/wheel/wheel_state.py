@@ -76,8 +76,6 @@ class WheelState(NamedTuple):
     added: Added | None = None  # what wheel and testbed effects add to the closed forms
     # the soil under this window from the estimated one; None where it is the same
     here: Here | None = None
-    # ∂(T, DP) by each uncertain effect parameter, in its σ
-    by_parameters: tuple[tuple[float, float], ...] = ()
     situation: Complete | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
     grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`

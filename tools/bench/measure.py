@@ -268,7 +268,7 @@ def update(subject: Subject) -> Figures:
         state, account = tracker.step(state, snapshot)
     estimate, measurement = state.estimate, tracker.measurement
     offered = measurement.linearise(
-        account.now, measurement.predict(estimate, account.now), estimate
+        account.now, measurement.predict(estimate, account.now), estimate, state.by_parameters
     )
 
     def cost(engine: str) -> float:

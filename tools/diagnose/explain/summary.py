@@ -120,8 +120,9 @@ def _unexplained(decision: Decision) -> str:
 
 def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
     """What resembles the misfit as well as its rivals do, and why it does not explain it."""
-    bent = round(of.forms, 2) > 0.0
-    why = f"in a form {of.forms:.0%} off ours" if bent else "and no more of it"
+    why = f"in a form {of.forms:.0%} off ours" if round(of.forms, 2) > 0.0 else "and no more of it"
+    if not of.foretells:
+        why = "but unseen runs are predicted worse with it"
     where = PLACE_OF[EFFECTS[of.name].stage]
     taken = f"takes {of.share:.0%} of the misfit, {why}: probably something else in {where}."
     if not rivals:

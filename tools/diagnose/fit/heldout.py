@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -105,6 +105,16 @@ def _log_density(error: Array, jacobian: Array, joint: Array, others: Array) -> 
     pulled = solve_triangular(joint, jacobian.T @ error, lower=True, check_finite=False)
     spread = np.log(np.diag(joint)).sum() - np.log(np.diag(others)).sum()
     return float(-0.5 * (error @ error - pulled @ pulled) - spread)
+
+
+def missed(problem: Problem, fitted: Fitted) -> float:
+    """What a fit misses of runs that were held out, by their noise: the root of the sum of the mean
+    squares of all channels.
+    """
+    stack = problem.stack
+    far = rmse(stack, held_out(fitted, run_folds(stack)).predicted)
+    told = zip(stack.rig.channels, problem.noise.colours, strict=True)
+    return float(np.sqrt(sum((far[channel] / colour.sigma) ** 2 for channel, colour in told)))
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:

@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
+from gritd.tools.diagnose.fit.heldout import missed
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
@@ -62,7 +63,7 @@ def _beside(
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return attempted(lambda: unexplained_with(search.screening, model))
+            return _with_unexplained(search, model)
 
     made = each(jobs, nameless, models, shared(search), lambda done: tell(done, len(models)))
     return dict(zip(models, made, strict=True))
@@ -98,7 +99,8 @@ def judged(
     calibration: OddsCalibration,
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
-    to be there than to be resembled, and likelier than that nothing of the list is there.
+    to be there than to be resembled, and likelier than that nothing of the list is there; and all
+    only where runs that were held out are predicted better with them.
     """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
@@ -114,24 +116,35 @@ def judged(
     least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
     kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
     told, share = _told(search, best, kept)
-    if told not in beside:
-        beside = {told: attempted(lambda: unexplained_with(search.screening, told))}
+    whole = beside[told] if told in beside else _with_unexplained(search, told)
+    foretold = not told.names or _foretold(search, whole.model if whole is not None else told)
+    if not foretold:
+        told, share, whole = search.bare, 0.0, beside.get(search.bare)
 
     return Decision(
         "explained" if told.names else "unlisted",
         told,
         share,
-        beside[told],
+        whole,
         probability,
         unlisted,
         _groups(every, told if told.names else best.model),
         every,
         tuple(
-            Resembled(name, best.share, best.model.form_share(name))
+            Resembled(name, best.share, best.model.form_share(name), foretold or name not in kept)
             for name in best.names
             if name not in told.names and _weight(every, best) > TUNING.verdict.resembles
         ),
     )
+
+
+def _with_unexplained(search: EffectSearch, model: Model) -> Nameless | None:
+    return attempted(lambda: unexplained_with(search.screening, model))
+
+
+def _foretold(search: EffectSearch, whole: Model) -> bool:
+    """Whether a model misses less than the equations alone of runs that were held out."""
+    return missed(search.problem, whole.fitted) < missed(search.problem, search.base.fitted)
 
 
 def trusting(

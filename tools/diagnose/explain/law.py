@@ -60,6 +60,12 @@ class Start:
     functions: tuple[Signature, ...]
     columns: Array
 
+    @property
+    def taken(self) -> Array:
+        """How much of each column was fitted."""
+        slack = self.fitted.slack
+        return slack[slack.size - self.columns.shape[1] :]
+
 
 def find_law(search: EffectSearch, model: Model, location: Sequence[Location]) -> FittedLaw | None:
     """The law on top of a model; None where the rig or the channel has none."""
@@ -104,11 +110,10 @@ def _with_functions(screening: Screening, model: Model) -> Start:
 
 def _words(stack: Stack, start: Start) -> Iterator[str]:
     """Every step and wave, with its size in the channel's unit."""
-    taken = start.fitted.slack[len(start.fitted.slack) - start.columns.shape[1] :]
     ends = np.cumsum([0, *(s.columns.shape[1] for s in start.functions)])
 
     for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
-        added = start.columns[:, first:last] @ taken[first:last]
+        added = start.columns[:, first:last] @ start.taken[first:last]
         acting = added[added != 0.0]
         if function.shape.kind == "wave":
             size = float(np.sqrt(2.0 * np.mean(acting**2)))
@@ -198,7 +203,7 @@ def _law(
         channel,
         "; ".join(parts),
         {**(domain if quantities else {}), **ranges},
-        taken_share(search, Model(fitted)),
+        taken_share(search, Model(fitted), start.columns @ start.taken),
         {**quantities, **edges},
     )
 

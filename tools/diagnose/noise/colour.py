@@ -132,14 +132,17 @@ def products_of_innovations(
     """Products (g, m, m) of the innovations of columns (n, m) under noise of g colours and unit
     variance; log det of each covariance. beside: (n,) or (n, g) variance of white noise beside it.
 
-    Linear in n, and the innovations are never all in memory.
+    Linear in n, and the innovations are never all in memory. Columns of zeros have none.
     """
-    recursion, (_, width) = _recursion(gaps, colours, beside), columns.shape
-    rows = max(TUNING.noise.whitened_at_once // max(len(colours) * width, 1), 1)
+    acting = np.flatnonzero(columns.any(axis=0))
+    recursion = _recursion(gaps, colours, beside)
+    rows = max(TUNING.noise.whitened_at_once // max(len(colours) * acting.size, 1), 1)
 
-    gram = np.zeros((len(colours), width, width))
-    for piece in _innovations(columns, recursion, rows):
-        gram += piece.transpose(0, 2, 1) @ piece
+    own = np.zeros((len(colours), acting.size, acting.size))
+    for piece in _innovations(columns[:, acting], recursion, rows):
+        own += piece.transpose(0, 2, 1) @ piece
+    gram = np.zeros((len(colours), columns.shape[1], columns.shape[1]))
+    gram[:, acting[:, None], acting] = own
     return gram, _log_det(recursion)
 
 

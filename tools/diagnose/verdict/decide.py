@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
@@ -133,7 +134,8 @@ def judged(
         tuple(
             Resembled(name, best.share, best.model.form_share(name), foretold or name not in kept)
             for name in best.names
-            if name not in told.names and _weight(every, best) > TUNING.verdict.resembles
+            if name not in told.names
+            and best.share * _weight(every, best) > TUNING.verdict.resembles
         ),
     )
 
@@ -212,10 +214,11 @@ def _trust(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> d
     return {name: sum(w.probability * w.trusts[name] for w in alike) / total for name in best.names}
 
 
-def taken_share(search: EffectSearch, model: Model) -> float:
+def taken_share(search: EffectSearch, model: Model, more: Array | None = None) -> float:
     """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
     leaves when its effects are switched off and all else stays. Other forms of an effect do not
-    count, but for zeros, which no law tells how to go.
+    count, but for zeros, which no law tells how to go. more: (N,) what acts beside the effects and
+    counts as theirs, in the channels' units.
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
@@ -224,7 +227,8 @@ def taken_share(search: EffectSearch, model: Model) -> float:
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
 
-    left = [off.residual - shared, fitted.residual - shared - model.zeros()]
+    taken = model.zeros() + (0.0 if more is None else whiten(search.problem.noise, more))
+    left = [off.residual - shared, fitted.residual - shared - taken]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 

@@ -241,8 +241,13 @@ class Effect:
         return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
     @classmethod
+    def equation(cls) -> str:
+        """What it changes, and how."""
+        return cls.formula().partition("\n\n")[0]
+
+    @classmethod
     def formula(cls) -> str:
-        """The formula and its source."""
+        """The equation, what is to be known of it, and its source."""
         return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[2].strip()
 
 

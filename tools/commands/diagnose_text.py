@@ -28,7 +28,7 @@ def text(diagnosis: Diagnosis) -> str:
     lines = [
         f"verdict: {diagnosis.verdict}. {diagnosis.summary}",
         *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[1:SHOWN]),
-        *(_hypothesis(of, diagnosis) for of in _shown(diagnosis)),
+        *(line for of in _shown(diagnosis) for line in _hypothesis(of, diagnosis)),
         *_had(diagnosis.reference),
     ]
     if diagnosis.law is not None:
@@ -51,8 +51,10 @@ def _shown(diagnosis: Diagnosis) -> list[Hypothesis]:
     return [*diagnosis.accepted, *likely][:SHOWN]
 
 
-def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> str:
-    """Where names are accepted, the others are rivals; without any, they are no explanation."""
+def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> Iterator[str]:
+    """Where names are accepted, the others are rivals; without any, they are no explanation. Of an
+    accepted one its equation too.
+    """
     chance = f"probability {of.probability:.{DIGITS}f}"
     other = "rival" if diagnosis.accepted else "not accepted"
     head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
@@ -60,7 +62,9 @@ def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> str:
     values = _listed(of.parameters)
     others = of.indistinguishable_from
     alike = f"; cannot be distinguished from {', '.join(others)}" if others else ""
-    return f"{head}{f': {values}' if values else ''}{alike}"
+    yield f"{head}{f': {values}' if values else ''}{alike}"
+    if of.accepted:
+        yield from (f"    {line}" for line in of.equation.splitlines())
 
 
 def _had(reference: Reference | None) -> Iterator[str]:

@@ -128,6 +128,7 @@ def _bar(h: Hypothesis) -> Markup:
         value,
         track,
         tag("p", h.sentence, class_="note") if h.sentence else None,
+        tag("pre", h.equation) if h.accepted and h.equation else None,
         class_="bar",
     )
 

@@ -146,6 +146,7 @@ def _hypotheses(
                 indistinguishable_from=alike,
                 accepted=accepted,
                 sentence=EFFECTS[name].sentence(),
+                equation=EFFECTS[name].equation(),
                 score_nats=search.first.evidence.get(name, 0.0),
                 separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
                 other_forms=forms,

@@ -85,6 +85,7 @@ class Hypothesis:
     indistinguishable_from: tuple[str, ...] = ()
     accepted: bool = False
     sentence: str = ""  # the effect in plain words
+    equation: str = ""  # what it changes, and how
     score_nats: float = 0.0  # of its signature, before the nonlinear fit
     separated_by: Mapping[str, str] = field(
         default_factory=dict

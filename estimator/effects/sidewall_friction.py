@@ -20,12 +20,13 @@ class SidewallFriction(Effect):
     """Both faces of the wheel rub on the soil in which they are buried.
 
     T + 2∫τ_f [x² − y(V − y)]/|u| dA,   DP − 2∫τ_f (V − y)/|u| dA
-    τ_f = s (c + K₀ σ̄ tan φ),   K₀ = ½,   σ̄ = W/(b r sin θ₁),   u ∝ (V − y, x),   V = r(1 − i)
+    τ_f = s (c + K₀ σ̄ tan φ),   K₀ = ½,   σ̄ = W/(b r sin θ₁)
+    u ∝ (V − y, x),   V = r(1 − i)
 
     On the buried segment of each face, against the sliding velocity u of a point x ahead of and y
-    below the axle. The lift of the faces is left out. Source: rigid-plastic sliding of a disc; Mohr-Coulomb
-    strength as in Eq. (2), and the faces of the wheel as in Ishigami et al. (2007), J. Field
-    Robotics 24, 233-250.
+    below the axle. The lift of the faces is left out. Source: rigid-plastic sliding of a disc;
+    Mohr-Coulomb strength as in Eq. (2), and the faces of the wheel as in Ishigami et al. (2007), J.
+    Field Robotics 24, 233-250.
     """
 
     share: float = strength(

@@ -211,6 +211,7 @@ def explained() -> Diagnosis:
                 ("current_offset",),
                 True,
                 "Motor, gear and bearings consume a constant torque while the wheel turns.",
+                "T_loss = T_C sign(ω)",
                 separated_by={"current_offset": STANDSTILL},
             ),
             Hypothesis(

@@ -202,7 +202,7 @@ def _orders(stack: Stack) -> Array:
     """
     fit = TUNING.fit
     turns = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs) / (2.0 * np.pi)
-    lowest = max(fit.lowest_ripple, TUNING.noise.cycles / max(turns, SPAN))
+    lowest = max(fit.lowest_ripple, TUNING.orders.cycles / max(turns, SPAN))
     return np.arange(lowest, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
 
 

@@ -101,10 +101,10 @@ class _Part:
 class _Channel:
     """The spectra of one channel, less the lines found so far."""
 
-    def __init__(self, name: str, parts: Sequence[_Part]) -> None:
+    def __init__(self, name: str, parts: Sequence[_Part], axes: Sequence[str] = AXES) -> None:
         self.name, self.parts = name, list(parts)
         self._waves: dict[tuple[str, float], list[Array]] = {}  # of each line taken, in each part
-        self.places = {axis: places_of([p.samples for p in parts], axis) for axis in AXES}
+        self.places = {axis: places_of([p.samples for p in parts], axis) for axis in axes}
         self._renew()
         self._first = dict(self.chances)
 
@@ -274,6 +274,22 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
                 lines += [] if _rest(line, lines) else [line, *_overtones(channel, line, len(runs))]
     return tuple(_with_harmonics(lines, channels))
+
+
+def lines_along(parts: Sequence[Samples]) -> Iterator[float]:
+    """Places of the lines of one channel along its time alone, each part with its own phase, the
+    strongest first.
+    """
+    without_trend = [p.with_values(p.detrended(p.values)) for p in parts]
+    channel = _Channel("", [_Part(0, p) for p in without_trend], ("time",))
+    sure = float(np.log(TUNING.orders.level / channel.places["time"].count))
+    for _ in range(TUNING.orders.most_lines):
+        chance, place = channel.strongest("time", sure)
+        if chance > sure:
+            return
+        at = channel.refined("time", place)
+        channel.take("time", at)
+        yield at
 
 
 def _overtones(channel: _Channel, line: SpectralLine, runs: int) -> Iterator[SpectralLine]:

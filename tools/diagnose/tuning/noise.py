@@ -9,7 +9,6 @@ from gritd.tools.diagnose.tuning.field import tuned
 
 SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95, 0.99)
 CELLS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
-DAMPED = "damping of a mean over an interval"
 
 
 @dataclass(frozen=True)
@@ -70,24 +69,6 @@ class NoiseTuning:
 
     # --- lines.py ---
     stretch: float = tuned(40.0, "s", "for which a wave keeps its phase at least")
-    cycles: float = tuned(2.0, "cycles", "in a stretch, to be distinguished from a trend")
-    line_density: float = tuned(
-        2.0, "-", "frequencies tried in each that the longest stretch resolves"
-    )
-    line_nyquist: float = tuned(0.35, "-", "of the grid's rate: faster waves are damped", DAMPED)
-    least_interval: float = tuned(
-        1e-3, "-", "of the longest stretch: values along an axis count as no closer", "run time"
-    )
-    most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
-    stretch_values: int = tuned(12, "values", "a stretch must hold")
-    line_chance: float = tuned(
-        0.01, "probability", "of any line of a channel by noise of a smooth spectrum"
-    )
-    near_line: float = tuned(1.5, "resolved frequencies", "closer is the line itself")
-    far_line: float = tuned(7.0, "resolved frequencies", "farther is no neighbour of a line")
-    strongest_lines: int = tuned(3, "lines", "of a channel along an axis that may stand out")
-    long_waves: int = tuned(6, "waves", "of the bed that are too long to have neighbours, at most")
-    values_per_line: int = tuned(8, "values", "of a channel for each column that lines may take")
 
     # --- replicates.py ---
     cell_widths: Mapping[str, float] = tuned(

@@ -32,9 +32,10 @@ from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.noise.estimate import first_guess
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.report import comparison
 from gritd.tools.report.comparison import Comparison
 
@@ -114,7 +115,7 @@ def compare(
     if not other_rig:
         check_rig(recordings, settings, configuration.source)
     series = [signals(recording, settings, RATE) for recording in recordings]
-    rig = WheelRig(series, settings, read_off=False)
+    rig = wheel_rig(series, settings, read_off=False)
     stack = Stack(rig)
 
     if stack.size == 0:
@@ -140,13 +141,13 @@ def compare(
             *(effect.name for effect in rig.baseline),
             *(["discrepancy"] if settings.discrepancy is not None else []),
         ),
-        tuple(rig.caveats),
+        tuple(rig.words.caveats),
         _redo(paths, configuration, command),
         tuple(f"{recording.path}: {line}" for recording in recordings for line in recording.damage),
     )
 
 
-def _names(rig: WheelRig, paths: Sequence[Path]) -> list[str]:
+def _names(rig: Rig, paths: Sequence[Path]) -> list[str]:
     """Of the runs; with the file's where two runs have the same."""
     names = [run.name for run in rig.runs]
     return [
@@ -156,7 +157,7 @@ def _names(rig: WheelRig, paths: Sequence[Path]) -> list[str]:
 
 
 def _traces(
-    rig: WheelRig, names: Sequence[str], constants: tuple[Array, Array], sigma: dict[str, float]
+    rig: Rig, names: Sequence[str], constants: tuple[Array, Array], sigma: dict[str, float]
 ) -> tuple[Trace, ...]:
     before, after = (rig.predict(u, ()) for u in constants)
 
@@ -177,7 +178,7 @@ def _traces(
     )
 
 
-def _soil(rig: WheelRig, fit: Fitted) -> SoilFit:
+def _soil(rig: Rig, fit: Fitted) -> SoilFit:
     spread = np.sqrt(np.diag(fit.covariance()))
     known = [
         (k, float(u), float(s))

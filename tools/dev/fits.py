@@ -45,7 +45,7 @@ from gritd.tools.diagnose.method import accustomed, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING
@@ -229,7 +229,7 @@ def _drawn(rng: np.random.Generator) -> Rig:
     plan = draw(config.load(packaged()).settings, rng)
     name = str(rng.choice(sorted(EFFECTS)))
     acting = [scaled(EFFECTS[name], LARGEST, rng)] if rng.random() < 2.0 / 3.0 else []
-    return WheelRig(record(plan, acting), plan.settings)
+    return wheel_rig(record(plan, acting), plan.settings)
 
 
 # ---- the page ----------------------------------------------------------------------------------

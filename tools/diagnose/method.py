@@ -91,9 +91,9 @@ def accustomed(
     """The rig with what its reference shows by itself in both campaigns, and the verdict on that; a
     rig without a reference as it is.
     """
-    alone = rig.reference
-    if alone is None:
+    if rig.reference is None or rig.having is None:
         return rig, None
+    alone = rig.reference()
 
     def said(what: str) -> None:
         step(f"{OF_REFERENCE}{what}")

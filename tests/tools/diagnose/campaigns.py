@@ -15,7 +15,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Soil
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import RATE, Plan, record
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import soil_of
@@ -83,7 +83,7 @@ def soil() -> Soil:
 
 
 def diagnosed(drawn: Plan, acting: Sequence[Effect] = ()) -> Diagnosis:
-    return diagnose(WheelRig(record(drawn, acting), drawn.settings))
+    return diagnose(wheel_rig(record(drawn, acting), drawn.settings))
 
 
 def group(found: Diagnosis) -> set[str]:

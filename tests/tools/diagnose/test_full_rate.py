@@ -17,7 +17,7 @@ from gritd.tools.diagnose.rig.adapter import rig_of as recorded_rig
 from gritd.tools.diagnose.rig.full_rate import beside_lines, restored
 from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -84,7 +84,7 @@ def test_a_ripple_of_the_reference_goes_on_with_its_exact_order() -> None:
     assert rig.lines.new and rig.lines.orders(2.0, 200.0) == []
 
     stack = Stack(rig)
-    smooth = Stack(WheelRig([*record(still, ())] * 2, settings(), 3, "same", lines=rig.lines))
+    smooth = Stack(wheel_rig([*record(still, ())] * 2, settings(), 3, "same", lines=rig.lines))
     residual = stack.measured - smooth.measured
     torque = stack.of("torque") & (stack.covariate("speed") > 0.0)
     columns, rippling = rippling_columns(stack, residual)[torque], residual[torque]
@@ -122,7 +122,7 @@ def test_a_gear_is_named_where_the_encoder_begins_anew_each_run() -> None:
 
     signals, reads = zip(*turned, strict=True)
     beside, lines = beside_lines(signals, [lambda read=read: read for read in reads], 2.0)
-    found = diagnose(WheelRig(beside, settings(), lines=lines), quick=True)
+    found = diagnose(wheel_rig(beside, settings(), lines=lines), quick=True)
     assert [h.effect for h in found.accepted] == ["gear_ripple"]
     assert any("begins at other angles" in note for note in found.caveats)
 

@@ -6,7 +6,7 @@ import pytest
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.method import diagnose
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan
@@ -18,7 +18,7 @@ def test_a_first_answer_names_the_strongest_and_says_so() -> None:
     drawn = plan(seconds=12.0)
     acting = (make("sinkage_datum", {"offset": 0.004}),)
     before = TUNING.search
-    rig = WheelRig(record(drawn, acting), drawn.settings)
+    rig = wheel_rig(record(drawn, acting), drawn.settings)
     found = diagnose(rig, redo={"quick": True}, quick=True)
 
     assert found.hypotheses[0].effect == "sinkage_datum"

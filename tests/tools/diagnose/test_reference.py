@@ -13,7 +13,8 @@ from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose, fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
@@ -30,20 +31,20 @@ HABITS = (
 NEW = make("viscous_friction", {"damping": 0.8})
 
 
-def rig_of(habits: Sequence[Effect], new: Sequence[Effect]) -> WheelRig:
+def rig_of(habits: Sequence[Effect], new: Sequence[Effect]) -> Rig:
     """A reference campaign with habits, and one with something new beside them."""
     before = record(plan(seed=3, seconds=24.0, wrench=False), habits)
     after = record(plan(seed=4, seconds=24.0, wrench=False), (*habits, *new))
     moved = [replace(s, name=f"new-{s.name}") for s in after]
-    return WheelRig([*before, *moved], settings(), len(before), "same")
+    return wheel_rig([*before, *moved], settings(), len(before), "same")
 
 
-def elsewhere(new: Sequence[Effect]) -> WheelRig:
+def elsewhere(new: Sequence[Effect]) -> Rig:
     """A rig as the library has it; the new campaign is driven at two thirds of the speed."""
     before = record(plan(seed=3), ())
     after = record(plan(seed=4, pace=0.66), new)
     moved = [replace(s, name=f"new-{s.name}") for s in after]
-    return WheelRig([*before, *moved], settings(), len(before), "same")
+    return wheel_rig([*before, *moved], settings(), len(before), "same")
 
 
 def judged(new: Sequence[Effect]) -> Diagnosis:

@@ -13,7 +13,7 @@ from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.fit import heldout
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import BentRail, CableChainDrag
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
@@ -101,7 +101,7 @@ def test_no_force_sensor_degrades_honestly() -> None:
 
 def test_repeats_do_not_leak() -> None:
     """Whole runs, and whole loads and slip bands, are held out."""
-    stack = Stack(WheelRig(record(plan(), ()), settings()))
+    stack = Stack(wheel_rig(record(plan(), ()), settings()))
     assert [set(stack.run[f]) for f in heldout.run_folds(stack)] == [{0}, {1}, {2}]
     load = stack.covariate("load")
     for fold in heldout.condition_folds(stack)[:3]:
@@ -118,10 +118,10 @@ def test_an_applied_effect_is_the_next_baseline() -> None:
     text = applied(document, found)
     calibrated = config.loads(text, "new.yaml").settings
     again = plan(seed=5)
-    rig = WheelRig(record(again, (friction,)), calibrated)
+    rig = wheel_rig(record(again, (friction,)), calibrated)
     assert diagnose(rig).verdict == "consistent"
     new = diagnose(
-        WheelRig(record(again, (friction, make("slip_sinkage", {"growth": 0.1}))), calibrated)
+        wheel_rig(record(again, (friction, make("slip_sinkage", {"growth": 0.1}))), calibrated)
     )
     assert [h.effect for h in new.accepted] == ["slip_sinkage"]
     assert "viscous_friction" in new.baseline

@@ -43,20 +43,24 @@ def next_experiment(
 def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     rig = search.problem.stack.rig
-    gains = {key: _told_apart(search, rivals, key) for key in rig.menu.driven} | _measured(
+    gains = {key: _told_apart(search, rivals, key) for key in rig.words.menu.driven} | _measured(
         rig, rivals
     )
     settled = {key: sum(gain >= TUNING.screen.sure for gain in each) for key, each in gains.items()}
 
-    key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
-    least = min(TUNING.screen.sure, max(gains[key]))
-    told = [m for m, gain in zip(rivals[1:], gains[key], strict=True) if gain >= least > 0.0]
+    best = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])), default="")
+    each = gains.get(best, [])
+    least = min(TUNING.screen.sure, max(each, default=0.0))
+    told = [m for m, gain in zip(rivals[1:], each, strict=False) if gain >= least > 0.0]
+    if not told:
+        return _by_hand(rig, _apart(rivals))
+    return _foretold(best, float(np.mean(each)), _apart([rivals[0], *told]))
 
-    names = tuple(
-        dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
-    )
 
-    return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(rig, names)
+def _apart(rivals: Sequence[Model]) -> tuple[str, ...]:
+    """Names that some of these have and others have not."""
+    common = set.intersection(*(set(m.names) for m in rivals))
+    return tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in common))
 
 
 def _most_shown(gains: Mapping[str, Mapping[str, float]]) -> NextExperiment | None:
@@ -96,18 +100,11 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.rivals] if best.names else []
 
 
-def _common(rivals: list[Model]) -> set[str]:
-    return set.intersection(*(set(m.names) for m in rivals))
-
-
 def _told_apart(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
     """Expected gain between the first and every other rival [nats]."""
     rig = search.problem.stack.rig
     first, *others = rivals
     here = rig.foresee(key, first.fitted.u, first.fitted.acting)
-    if here is None:
-        return [0.0] * len(others)
-
     slopes = _slopes(search, key, here, first.fitted.u, first.fitted.acting)
     gains = []
     for other in others:
@@ -126,7 +123,7 @@ def _measured(rig: Rig, rivals: list[Model]) -> dict[str, list[float]]:
         for m in rivals
         for n in m.names
         for k in rig.effects[n].confusable_with.values()
-        if k not in rig.menu.driven
+        if k not in rig.words.menu.driven
     }
 
     return {key: [_read(rig, first, other, key) for other in others] for key in sorted(keys)}
@@ -159,10 +156,8 @@ def _unseen_shown(search: EffectSearch) -> dict[str, dict[str, float]]:
     unseen = {name: _expected(rig.effects[name]) for name in _not_shown(search)}
 
     out = {}
-    for key in rig.menu.driven if unseen else ():
+    for key in rig.words.menu.driven if unseen else ():
         here = rig.foresee(key, base.fitted.u, ())
-        if here is None:
-            continue
         slopes = _slopes(search, key, here, base.fitted.u, ())
         there = {n: rig.foresee(key, base.fitted.u, (one,)) for n, one in unseen.items()}
         out[key] = {
@@ -214,7 +209,7 @@ def _along_misfit(
     """
     covariate, q = (location[0].covariate, location[0].q) if location else ("wheel_angle", 1.0)
     gain = -float(np.log(max(q, SQUARE))) / len(rig.runs)
-    return _foretold(rig.menu.along.get(covariate, rig.menu.otherwise), gain, separates)
+    return _foretold(rig.words.menu.along.get(covariate, rig.words.menu.otherwise), gain, separates)
 
 
 # ---- what is foreseen --------------------------------------------------------------------------
@@ -237,8 +232,7 @@ def _slopes(
     return np.column_stack(slopes)
 
 
-def _values(foreseen: Foreseen | None) -> Array:
-    assert foreseen is not None
+def _values(foreseen: Foreseen) -> Array:
     return np.concatenate(
         [np.asarray(v)[:: TUNING.explain.foreseen_together] for v in foreseen.channels.values()]
     )

@@ -206,7 +206,11 @@ def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[st
     found = {}
     for f, x, s in zip(model.fitted.free, *model.parameters(), strict=True):
         if f.name == name and (p := f.parameter):
-            value, own, unit = f.value(float(x)), float(s) * p.sigma, rig.unit_factor(p.unit)
+            value, own, unit = (
+                f.value(float(x)),
+                float(s) * p.sigma,
+                rig.unit_factors.get(p.unit, 1.0),
+            )
             other = forms * (value - p.off) if p.role == "strength" else 0.0
             found[p.name] = Quantity(value * unit, hypot(own, other) * unit, p.unit)
     return found
@@ -258,7 +262,7 @@ def _caveats(
     effects that no fit was had of.
     """
     rig = problem.stack.rig
-    sentences = list(rig.caveats)
+    sentences = list(rig.words.caveats)
     if failed:
         names = listed(sorted({" with ".join(of) for of in failed}))
         sentences.append(f"Left out, for their algebra failed: {names}.")
@@ -276,7 +280,7 @@ def _caveats(
     acting = (*rig.baseline, *accepted.fitted.acting)
     return (
         *sentences,
-        *rig.shortcomings,
+        *rig.words.shortcomings,
         *doubts(rig, whole, problem.noise),
         *left_over(rig, acting),
         *late(rig, acting),

@@ -70,7 +70,7 @@ class Start:
 def find_law(search: EffectSearch, model: Model, location: Sequence[Location]) -> FittedLaw | None:
     """The law on top of a model; None where the rig or the channel has none."""
     stack = search.problem.stack
-    form = stack.rig.law
+    form = stack.rig.words.law
     if form is None:
         return None
     prefix = next((form.prefix[p.channel] for p in location if p.channel in form.prefix), None)
@@ -186,7 +186,7 @@ def _law(
     domain: Domain,
 ) -> Law:
     fitted, stack = start.fitted, search.problem.stack
-    form = stack.rig.law
+    form = stack.rig.words.law
     assert form is not None
     channel, quantities = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
     terms = [

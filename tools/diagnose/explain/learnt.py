@@ -88,11 +88,7 @@ class _Unknowns:
             self.places.append(slice(known, known + len(parts[-1])))
             known += len(parts[-1])
         # what the configuration left open of an earlier δ stands last in the tolerance
-        self.held = (
-            np.zeros((problem.stack.size, 0))
-            if rig.held is None
-            else rig.held.doubts(problem.stack)
-        )
+        self.held = problem.stack.doubts
         parts.append(marginal.last_of_tolerance(self.held.shape[1]))
         self.place_of_held = slice(known, known + len(parts[-1]))
         self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))

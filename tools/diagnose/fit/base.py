@@ -102,7 +102,6 @@ def allowed(stack: Stack) -> Array:
     """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, the relief of the
     bed, and what a learnt discrepancy of the configuration leaves open, last.
     """
-    share, held = TUNING.fit.tolerance, stack.rig.held
+    share = TUNING.fit.tolerance
     smooth = (tolerance(stack, share), share * of_differences(stack))
-    own = np.column_stack((*smooth, stack.unrest, stack.reliefs))
-    return own if held is None else np.column_stack((own, held.doubts(stack)))
+    return np.column_stack((*smooth, stack.unrest, stack.reliefs, stack.doubts))

@@ -20,6 +20,7 @@ from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.noise import replicates
+from gritd.tools.diagnose.noise.blur import blur_of
 from gritd.tools.diagnose.noise.colour import Colour, Noise, products_of_innovations, step_of
 from gritd.tools.diagnose.noise.lines import standing
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
@@ -64,7 +65,7 @@ def uncertain(
     """
     off = spikes(stack, residual, colours, explainable)
 
-    return np.hypot(np.hypot(stack.rig.blur(stack, predicted), off), stack.motion_sigma)
+    return np.hypot(np.hypot(blur_of(stack, predicted), off), stack.motion_sigma)
 
 
 def first_guess(stack: Stack, predicted: Array) -> Noise:

@@ -1,4 +1,4 @@
-"""Waves in time and along the bed that are no noise.
+"""Waves in time and along the bed: where they are looked for, and those that are no noise.
 
 A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any
 length, and what shakes a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its
@@ -22,6 +22,8 @@ from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
+
+AXES = ("time", "position")
 
 
 def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Index) -> Array:
@@ -50,7 +52,7 @@ def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Ind
     return np.column_stack(columns)
 
 
-def _parts(stack: Stack, channel: str) -> list[Index]:
+def stretches(stack: Stack, channel: str) -> list[Index]:
     """Places (n,) of a channel's values in one run while the wheel moves, long runs cut into equal
     parts.
     """
@@ -68,9 +70,40 @@ def _parts(stack: Stack, channel: str) -> list[Index]:
     return [index for index in parts if index.size >= TUNING.noise.cell_values]
 
 
+def frequencies(stack: Stack, channel: str, axis: str) -> Array:
+    """Waves [1/s, 1/m] that the grid shows (f,): some cycles in the longest stretch at least; empty
+    where there is none.
+    """
+    x, parts = stack.covariate(axis), stretches(stack, channel)
+    longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
+    if longest <= SPAN:
+        return np.zeros(0)
+
+    interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
+    span = longest if axis == "time" else float(np.ptp(x[np.concatenate(parts)]))
+    every = np.arange(TUNING.noise.most_frequencies) / (TUNING.noise.line_density * span)
+    tried = TUNING.orders.cycles / longest + every
+    return np.asarray(tried[tried * interval < TUNING.noise.line_nyquist])
+
+
+def waves(x: Array, frequency: Array) -> Array:
+    """Cosines and sines (n, f, 2)."""
+    phase = 2.0 * np.pi * np.multiply.outer(x, frequency)
+    return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
+
+
+def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
+    """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it
+    itself.
+    """
+    longest = max(float(np.ptp(x[index])) for index in parts)
+    apart = np.abs(tried[:, None] - tried) * longest
+    return ((apart >= TUNING.orders.near) & (apart <= TUNING.orders.far)).astype(float)
+
+
 def _phases(stack: Stack, channel: str) -> Iterator[tuple[str, list[Index]]]:
     """Axes, and the values that share a phase."""
-    parts = _parts(stack, channel)
+    parts = stretches(stack, channel)
     if not parts:
         return
     yield "time", parts
@@ -99,15 +132,14 @@ def _long(stack: Stack, channel: str) -> Array:
     """Waves along the bed (N, m), one phase for all runs, too long to have neighbours; of a single
     run none.
     """
-    parts, x = _parts(stack, channel), stack.covariate("position")
-    longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
-    if len(parts) < 2 or longest <= SPAN:
+    parts, tried = stretches(stack, channel), frequencies(stack, channel, "position")
+    if len(parts) < 2 or not tried.size:
         return np.zeros((stack.size, 0))
 
-    index, beyond = np.concatenate(parts), TUNING.orders.near + 1.0  # cells without neighbours
-    cycles = TUNING.orders.cycles / longest
-    tried = cycles + np.arange(1.0 + 2.0 * beyond) / (2.0 * float(np.ptp(x[index])))
-    shapes = [pair(x[index], at) for at in tried if at < cycles + beyond / longest]
-    out = np.zeros((stack.size, 2 * len(shapes)))
-    out[index] = np.column_stack(shapes)
+    index, x = np.concatenate(parts), stack.covariate("position")
+    longest = max(float(np.ptp(x[part])) for part in parts)
+    beyond = (TUNING.orders.cycles + TUNING.orders.near + 1.0) / longest
+    shapes = waves(x[index], tried[tried < beyond][: TUNING.noise.long_waves])
+    out = np.zeros((stack.size, 2 * shapes.shape[1]))
+    out[index] = shapes.reshape(index.size, -1)
     return out

@@ -13,7 +13,7 @@ from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.latencies import latencies_in
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
-from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
+from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -40,11 +40,11 @@ def rig_of(
 
 def _drive_rig(recordings: Sequence[Recording], settings: Settings) -> Rig:
     # loads scipy.signal and scipy.stats too: a second and 60 MB, which nobody pays for a wheel
-    from gritd.tools.diagnose.rig.drive import DriveRig
+    from gritd.tools.diagnose.rig.drive import drive_rig
 
     series = [drive_series(r, settings) for r in recordings]
     names = [r.run.name or r.path.stem for r in recordings]
-    return DriveRig(series, names, settings)
+    return drive_rig(series, names, settings)
 
 
 def _wheel_rig(
@@ -67,13 +67,13 @@ def _wheel_rig(
     beside, lines = with_lines(ordered, means, settings, len(reference))
     late = latencies_in(ordered[len(reference) :], means[len(reference) :], settings)
 
-    rig = WheelRig(beside, settings, len(reference), bed, lines=lines, latencies=late)
+    rig = wheel_rig(beside, settings, len(reference), bed, lines=lines, latencies=late)
     for new, each in ((False, reference), (True, recordings)):
         _check_drives(rig, new, each)
     return rig, rate
 
 
-def _check_drives(rig: WheelRig, new: bool, recordings: Sequence[Recording]) -> None:
+def _check_drives(rig: Rig, new: bool, recordings: Sequence[Recording]) -> None:
     """Raises CommandError where the runs of a campaign are too short for a channel to tell
     anything: values count from some time after the wheel has started. What a campaign did not
     measure at all is no channel of it.

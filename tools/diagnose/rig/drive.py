@@ -14,15 +14,14 @@ in units of its usual speed; what is said is in newton metres and radians a seco
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from gritd.estimator.config.settings import ConfiguredEffect, Settings
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.limits import limits, raised
@@ -30,13 +29,10 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Balanced, Motion, Sensed, advanced, situation_of
 from gritd.estimator.terramechanics.soil import Array, Wheel
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.diagnose.orders.campaigns import NO_LINES
-from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.constants import of_channel
-from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, GridRun, Held
+from gritd.tools.diagnose.rig.interface import Constant, GridRun, Rig, RigWords
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
-from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 EFFECTS_OF_A_DRIVE = (
@@ -47,6 +43,10 @@ EFFECTS_OF_A_DRIVE = (
 OF_SOIL = (
     "cohesion", "tan_phi", "shear_modulus", "sinkage", "carried", "theta_1", "drawbar_pull",
 )  # fmt: skip
+CAVEAT = "A drive without soil: inertia and viscous friction are the base model."
+SMOOTH = (
+    ("speed",), ("velocity",), ("acceleration",), ("wheel_angle",), ("velocity", "acceleration"),
+)  # fmt: skip
 UNITS = {
     "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad",
     "wheel_angle": "rad", "time": "s", "heat": "A²·s", "direction": "-", "run": "-",
@@ -54,107 +54,68 @@ UNITS = {
 }  # fmt: skip
 
 
-class DriveRig:
-    """See interface.Rig."""
+def drive_rig(
+    series: Sequence[Mapping[str, Series]], names: Sequence[str], settings: Settings
+) -> Rig:
+    """A motor drive of position and current. Raises CommandError where a log is too short."""
+    constant = settings.drive.torque_constant.value
+    motions = [_motion(s, constant, n) for s, n in zip(series, names, strict=True)]
+    unit = _size(m.torque for m in motions) / TUNING.rig.usual_torque
+    speed = np.abs(np.concatenate([m.velocity for m in motions]))
+    usual = float(np.median(speed[speed > TUNING.rig.moving * speed.max()]))
 
-    channels = ("torque",)
-    units: Mapping[str, str] = UNITS
-    forms: tuple[FormSource, ...] = ()
-    held: Held | None = None
-    lines = NO_LINES
-    latencies: Sequence[Latency] = ()
-    reference = None
-    menu = MENU
-    heated = channels
-    smooth = (
-        ("speed",),
-        ("velocity",),
-        ("acceleration",),
-        ("wheel_angle",),
-        ("velocity", "acceleration"),
+    model = DriveModel(motions, _constants(motions, unit), unit, usual)
+    return Rig(
+        runs=[_run(m, n, usual) for m, n in zip(motions, names, strict=True)],
+        channels=("torque",),
+        units=UNITS,
+        constants=model.constants,
+        effects={n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE},
+        new=[True for _ in names],
+        predict=model.predict,
+        words=RigWords((CAVEAT,), replace(MENU, driven=())),
+        smooth=SMOOTH,
+        heated=("torque",),
+        filtered=True,
+        unit_factors={"rad/s": usual, "N·m": unit, "A": unit / constant},
     )
-    baseline: tuple[Effect, ...] = ()
-    partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
-    law = None
-    slipping = ""
-    tabled = False
-    stated_noise: Mapping[str, float] = {}
-    shortcomings: Sequence[str] = ()
 
-    def __init__(
-        self, series: Sequence[Mapping[str, Series]], names: Sequence[str], settings: Settings
-    ) -> None:
-        self.settings = settings
-        self.caveats: list[str] = [
-            "A drive without soil: inertia and viscous friction are the base model."
-        ]
-        self._motions = [
-            _motion(s, settings.drive.torque_constant.value, n)
-            for s, n in zip(series, names, strict=True)
-        ]
 
-        self.unit = _size(m.torque for m in self._motions) / TUNING.rig.usual_torque
-        speed = np.abs(np.concatenate([m.velocity for m in self._motions]))
-        self.usual = float(np.median(speed[speed > TUNING.rig.moving * speed.max()]))  # [rad/s]
+def _constants(motions: Sequence[DriveMotion], unit: float) -> tuple[Constant, ...]:
+    """A constant that is not known is nothing, give or take ten times what would take all of the
+    torque.
+    """
+    most = TUNING.rig.unknown_drive * TUNING.rig.usual_torque * unit
+    apart = TUNING.rig.stamps * max(m.sampled for m in motions)
+    return (
+        Constant("inertia", 0.0, most / _size(m.acceleration for m in motions), "kg·m²"),
+        Constant("damping", 0.0, most / _size(m.velocity for m in motions), "N·m·s/rad"),
+        of_channel("torque", "delay", apart, "s"),
+        of_channel("torque", "blur", apart**2, "s²"),
+    )
 
-        self.constants = (
-            Constant("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
-            Constant("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
-            of_channel(
-                "torque",
-                "delay",
-                apart := TUNING.rig.stamps * max(m.sampled for m in self._motions),
-                "s",
-            ),
-            of_channel("torque", "blur", apart**2, "s²"),
-        )
 
-        self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}
-        self.new = [True for _ in names]
-        self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
+@dataclass(frozen=True, eq=False)
+class DriveModel:
+    """unit: of torques [N·m]; usual: speed [rad/s]."""
 
-    def _most(self, values: Iterable[Array]) -> float:
-        """A constant that is not known is nothing, give or take ten times what would take all of
-        the torque.
-        """
-        return TUNING.rig.unknown_drive * TUNING.rig.usual_torque * self.unit / _size(values)
-
-    @property
-    def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
-        """Nothing (n,): both sides of the comparison go through one filter."""
-        return [{"torque": np.zeros_like(run.time)} for run in self.runs]
-
-    @property
-    def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """No channel (n,) of any part, for the same reason."""
-        return ()
-
-    @property
-    def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """No channel (n,) of any surface: a drive has no bed."""
-        return ()
-
-    def aside(self) -> AbstractContextManager[None]:
-        """Nothing is kept of a prediction."""
-        return nullcontext()
-
-    def having(self, effects: Sequence[ConfiguredEffect]) -> DriveRig:
-        """A drive has no reference that could show any."""
-        return self
+    motions: Sequence[DriveMotion]
+    constants: tuple[Constant, ...]
+    unit: float
+    usual: float
 
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
-        """Motor torque [N·m] of every run (n,), for constants u (q,) in prior σ and effects."""
+        """Motor torque [N·m]: see interface.Predict."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
         torques = [
-            self._torque(m, inertia / self.unit, damping / self.unit, effects)
-            for m in self._motions
+            self._torque(m, inertia / self.unit, damping / self.unit, effects) for m in self.motions
         ]
 
         return [
             {"torque": m.compared(_timed(t, m.step, *timing))}
-            for m, t in zip(self._motions, torques, strict=True)
+            for m, t in zip(self.motions, torques, strict=True)
         ]
 
     def _torque(
@@ -181,51 +142,34 @@ class DriveRig:
             sensed = effect.sensors(sensed, situation)
         return np.asarray(sensed.current) * self.unit
 
-    def recorded(self, channel: str) -> tuple[str, ...]:
-        """See interface.Rig."""
-        return (channel,)
 
-    def unit_factor(self, unit: str) -> float:
-        """Factor from a parameter of the library to what it means for this drive."""
-        if unit == "rad/s":
-            return self.usual
-        if unit == "A":
-            return self.unit / self.settings.drive.torque_constant.value
-        return self.unit if unit == "N·m" else 1.0
+def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
+    velocity, torque, angle = (
+        motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
+    )
+    still = TUNING.rig.still * usual
+    fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
 
-    def blur(self, stack: Stack, predicted: Array) -> Array:
-        """Nothing (N,): prediction and measurement go through the same filters."""
-        return np.zeros(predicted.shape)
-
-    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:
-        """None: the menu of experiments is a wheel's. Constants u (q,) in prior σ."""
-
-    def _run(self, motion: DriveMotion, name: str) -> GridRun:
-        velocity, torque, angle = (
-            motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
-        )
-        still = TUNING.rig.still * self.usual
-        fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
-
-        covariates = {
-            "speed": np.abs(velocity),
-            "velocity": velocity,
-            "acceleration": motion.compared(motion.acceleration),
-            "wheel_angle": angle,
-            "position": angle,
-            "time": motion.time[motion.kept],
-            "heat": np.cumsum(torque**2) * motion.every * motion.step,
-            "direction": np.tanh(velocity / still),
-            "constant": np.ones(velocity.size),
-        }
-        return GridRun(
-            name,
-            motion.time[motion.kept],
-            {"torque": torque},
-            {"torque": fastest > still},
-            covariates,
-            {"torque": np.zeros(velocity.size)},
-        )
+    covariates = {
+        "speed": np.abs(velocity),
+        "velocity": velocity,
+        "acceleration": motion.compared(motion.acceleration),
+        "wheel_angle": angle,
+        "position": angle,
+        "time": motion.time[motion.kept],
+        "heat": np.cumsum(torque**2) * motion.every * motion.step,
+        "direction": np.tanh(velocity / still),
+        "constant": np.ones(velocity.size),
+    }
+    return GridRun(
+        name,
+        motion.time[motion.kept],
+        {"torque": torque},
+        {"torque": fastest > still},
+        covariates,
+        np.zeros(velocity.size),
+        np.zeros(velocity.size),
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ directions, the rest that it has where it was learnt, and its prior where it was
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -15,94 +15,57 @@ from gritd.estimator.model.correction import Correction, weights_of
 from gritd.estimator.model.discrepancy import conditions_of, features_of
 from gritd.estimator.model.learnt import CHANNELS, LearntForm
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import GridRun
-from gritd.tools.diagnose.rig.stack import Stack
+from gritd.tools.diagnose.rig.interface import Channels, GridRun, Held
 from gritd.tools.diagnose.tuning import TUNING
 
 
-class HeldForm:
-    """See interface.Held."""
+def held_form(
+    form: LearntForm, runs: Sequence[GridRun], channels: Sequence[str], radius: float, lost: bool
+) -> Held:
+    """What a configuration holds of some runs' channels. lost: whether channel torque tells the
+    drive's loss, in which no soil acts.
+    """
+    correction = Correction(form)
+    kinds = {
+        c: CHANNELS.index(name)
+        for c in channels
+        if (name := "torque" if c == "axle_torque" else c) in CHANNELS
+        and not (lost and c == "torque")
+    }
+    told = [_told(run, radius, correction) for run in runs]
+    conditions, weights = (np.vstack(each) for each in zip(*told, strict=True))
+    at = correction.at(conditions, weights)
+    ends = np.cumsum([0, *(run.time.size for run in runs)])
 
-    def __init__(
-        self,
-        form: LearntForm,
-        runs: Sequence[GridRun],
-        channels: Sequence[str],
-        radius: float,
-        lost: Collection[str] = (),
-    ) -> None:
-        """lost: channels that tell the drive's loss, in which no soil acts."""
-        self._correction = Correction(form)
-        self._kinds = {
-            c: kind for c in channels if c not in lost and (kind := _kind(c)) is not None
-        }
+    def placed(columns: Mapping[int, Array]) -> list[Channels]:
+        """Values (N,) by kind, of all values of all runs."""
+        none = np.zeros(len(conditions))
+        every = {c: columns.get(kinds.get(c, -1), none) for c in channels}
+        return [{c: values[a:b] for c, values in every.items()} for a, b in pairwise(ends)]
 
-        told = [_told(run, radius, self._correction) for run in runs]
-        self._conditions = [conditions for conditions, _ in told]
-        self._weights = [weights for _, weights in told]
-
-        self._form = form
-        self.means: Sequence[Mapping[str, Array]] = [
-            self._mean(conditions, weights, channels) for conditions, weights in told
-        ]
-
-    def doubts(self, stack: Stack) -> Array:
-        """(N, t): see interface.Held."""
-        correction = self._correction.at(
-            np.vstack(self._conditions), np.vstack(self._weights)
-        )  # of all values of all runs, used or not
-
-        parts = [self._placed(stack, {k: correction.columns[:, k] for k in range(len(CHANNELS))})]
-        for kind, channel in enumerate(self._form.channels):
-            if channel is not None and kind in self._kinds.values():
-                columns = self._rest(kind, channel.size, channel.rest)
-                parts.append(self._placed(stack, {kind: columns}))
-
-        every = np.hstack(parts)
-        return every[:, np.any(every != 0.0, axis=0)]
-
-    def _mean(
-        self, conditions: Array, weights: Array, channels: Sequence[str]
-    ) -> Mapping[str, Array]:
-        mean = self._correction.at(conditions, weights).mean
-        none = np.zeros(len(mean))
-        return {c: mean[:, self._kinds[c]] if c in self._kinds else none for c in channels}
-
-    def _rest(self, kind: int, size: float, rest: float) -> Array:
-        """What no direction holds, of one channel: (n, t) of all values of all runs."""
-        conditions, weights = np.vstack(self._conditions), np.vstack(self._weights)[:, kind]
-        inside, features = (
-            self._correction.inside(conditions),
-            self._correction.features(conditions),
-        )
-        known = self._correction.told(inside, np.sum(features**2, axis=1))
-        learnt = rest * inside[:, None] * features
-
-        open_ = np.sqrt(1.0 - known)
-        far = (open_ > TUNING.explain.learnt_outside) & (weights != 0.0)
-        if not far.any():
-            return learnt * (weights * size)[:, None]
-        prior = features_of(conditions[far], TUNING.fit.form_features, TUNING.fit.form_left_out)
-        outside = np.where(far[:, None], prior.at(conditions) * open_[:, None], 0.0)
-        return np.hstack((learnt, outside)) * (weights * size)[:, None]
-
-    def _placed(self, stack: Stack, columns: Mapping[int, Array]) -> Array:
-        """Columns (n, t) by kind, of all values of all runs, at the values of the stack (N, t)."""
-        count = next(iter(columns.values())).shape[1]
-        ends = np.cumsum([0, *(len(run.time) for run in stack.rig.runs)])
-        none = np.zeros((int(ends[-1]), count))
-        by_channel = {c: columns.get(self._kinds.get(c, -1), none) for c in stack.rig.channels}
-        placed = [
-            stack.joined([{c: v[a:b, i] for c, v in by_channel.items()} for a, b in pairwise(ends)])
-            for i in range(count)
-        ]
-        return np.column_stack(placed) if placed else np.zeros((stack.size, 0))
+    doubts = [placed(dict(enumerate(column))) for column in at.columns.transpose(2, 1, 0)]
+    for kind, channel in enumerate(form.channels):
+        if channel is not None and kind in kinds.values():
+            rest = _rest(correction, conditions, weights[:, kind], channel.size, channel.rest)
+            doubts += [placed({kind: column}) for column in rest.T]
+    return Held(placed(dict(enumerate(at.mean.T))), doubts)
 
 
-def _kind(channel: str) -> int | None:
-    """Which δ is a channel's: both torques have the same."""
-    name = "torque" if channel == "axle_torque" else channel
-    return CHANNELS.index(name) if name in CHANNELS else None
+def _rest(
+    correction: Correction, conditions: Array, weights: Array, size: float, rest: float
+) -> Array:
+    """What no direction holds, of one channel: (N, t) of all values of all runs."""
+    inside, features = correction.inside(conditions), correction.features(conditions)
+    known = correction.told(inside, np.sum(features**2, axis=1))
+    learnt = rest * inside[:, None] * features
+
+    open_ = np.sqrt(1.0 - known)
+    far = (open_ > TUNING.explain.learnt_outside) & (weights != 0.0)
+    if not far.any():
+        return learnt * (weights * size)[:, None]
+    prior = features_of(conditions[far], TUNING.fit.form_features, TUNING.fit.form_left_out)
+    outside = np.where(far[:, None], prior.at(conditions) * open_[:, None], 0.0)
+    return np.hstack((learnt, outside)) * (weights * size)[:, None]
 
 
 def _told(run: GridRun, radius: float, correction: Correction) -> tuple[Array, Array]:

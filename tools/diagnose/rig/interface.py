@@ -1,16 +1,16 @@
 """What the engine needs of a rig: runs on a time grid, a prediction of the channels, what is known
 of its constants.
 
-A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil.
-The other rooms work on the arrays defined here and know a rig by this interface alone.
+A rig is one frozen value: `wheel_rig` makes it of a wheel in soil, `drive_rig` of a motor drive
+without soil. The other rooms work on the arrays defined here and know a rig by this alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,12 @@ from gritd.estimator.config.settings import ConfiguredEffect
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.discrepancy import Usual
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.orders.campaigns import Lines
+from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.latency import Latency
-
-if TYPE_CHECKING:
-    from gritd.tools.diagnose.rig.stack import Stack
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
+Channels = Mapping[str, Array]  # of one run (n,), each in its unit
 HAD = "had"  # kind of a constant: a parameter of an effect that a reference shows by itself
 
 
@@ -77,16 +75,20 @@ class Constant:
 
 @dataclass(frozen=True)
 class GridRun:
-    """One run on the analysis grid; arrays (n,). `used` says which values of a channel the
-    comparison counts; `idle` is 1 where a torque is the motor's alone that else is a loss, else 0.
+    """One run on the analysis grid; arrays (n,).
+
+    used:   which values of a channel the comparison counts.
+    idle:   1 where a torque is the motor's alone that else is a loss, else 0.
+    turned: 1 where the wheel has turned back and not settled yet, else 0.
     """
 
     name: str
     time: Array  # [s] since the campaign began
-    measured: Mapping[str, Array]
+    measured: Channels
     used: Mapping[str, Bools]
     covariates: Mapping[str, Array]
-    idle: Mapping[str, Array]
+    idle: Array
+    turned: Array
 
 
 @dataclass(frozen=True)
@@ -159,158 +161,116 @@ class FormSource:
         return int(self.conditions[0].shape[1])
 
 
-class Held(Protocol):
-    """The learnt discrepancy that a configuration holds already."""
+@dataclass(frozen=True, eq=False)
+class Held:
+    """The learnt discrepancy that a configuration holds already: of each run its mean, and each
+    direction that is left open of it, one standard deviation.
+    """
 
-    @property
-    def means(self) -> Sequence[Mapping[str, Array]]:
-        """Per run, mean (n,) in every channel, in its unit."""
-
-    def doubts(self, stack: Stack) -> Array:
-        """Columns (N, t) of unit normal weights: what is left open of it."""
+    means: Sequence[Channels]
+    doubts: Sequence[Sequence[Channels]]
 
 
-class Rig(Protocol):
-    """The adapter."""
+def _nothing_foreseen(experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
+    """Where the menu has nothing to drive."""
+    raise KeyError(experiment)
 
-    caveats: list[str]
 
-    @property
-    def runs(self) -> Sequence[GridRun]: ...
+class Predict(Protocol):
+    """Every channel of every run."""
 
-    @property
-    def channels(self) -> tuple[str, ...]: ...
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Of channels and covariates."""
-
-    @property
-    def constants(self) -> tuple[Constant, ...]: ...
-
-    @property
-    def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
-        """Constants that do to some values, marked per run (n,), what another constant does to all:
-        a cheap derivative.
-        """
-
-    @property
-    def effects(self) -> Mapping[str, type[Effect]]:
-        """The candidates."""
-
-    @property
-    def baseline(self) -> tuple[Effect, ...]:
-        """Effects of the configuration: the model has them already."""
-
-    @property
-    def new(self) -> Sequence[bool]:
-        """Of each run, whether candidates act in it; all of them where there is no reference."""
-
-    @property
-    def reference(self) -> Rig | None:
-        """The rig with the runs of the reference alone; None where there is none."""
-
-    def having(self, effects: Sequence[ConfiguredEffect]) -> Rig:
-        """The rig with effects in both campaigns, whose parameters are constants. A candidate of
-        the same name is what is new of it.
-        """
-
-    @property
-    def forms(self) -> tuple[FormSource, ...]:
-        """Where the form of the model may be off."""
-
-    @property
-    def held(self) -> Held | None:
-        """What of it the configuration holds already, where it does."""
-
-    @property
-    def lines(self) -> Lines:
-        """Ripples that the recordings show at their own rate."""
-
-    def recorded(self, channel: str) -> tuple[str, ...]:
-        """The channels as recorded that this one is compared as: itself, or both sides of a
-        difference.
-        """
-
-    @property
-    def slipping(self) -> str:
-        """The constant that changes the slip; "" where nothing slips."""
-
-    @property
-    def tabled(self) -> bool:
-        """Whether the recordings are tables of steady states: their scatter was drawn, white, by
-        what imported them.
-        """
-
-    @property
-    def stated_noise(self) -> Mapping[str, float]:
-        """Standard deviation of one reading of a channel as the configuration states it, in the
-        channel's unit; of those that it states one.
-        """
-
-    @property
-    def latencies(self) -> Sequence[Latency]:
-        """How late each channel is beside the motion, told at the recordings' own rate."""
-
-    @property
-    def smooth(self) -> tuple[tuple[str, ...], ...]:
-        """Covariates, alone or multiplied, on which a smooth misfit may depend."""
-
-    @property
-    def heated(self) -> tuple[str, ...]:
-        """Channels that are read through the motor: only these may change as it warms up."""
-
-    @property
-    def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
-        """Per run, standard deviation (n,) of every channel's prediction by what is left open of
-        the motion, in the channel's unit.
-        """
-
-    @property
-    def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """Of each part that moves, per run, what every channel (n,) is predicted too low by if the
-        unrest of its speed is noise of the sensor, in the channel's unit.
-        """
-
-    @property
-    def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """Of each wave of a surface that was prepared anew, per run what every channel (n,) reads
-        of it, one standard deviation, in the channel's unit.
-        """
-
-    def predict(
+    def __call__(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
-        """Every channel of every run, for constants u (q,) in prior σ and effects beyond the
-        baseline; everywhere: the effects act in the reference campaign too.
+        """Channels (n,) for constants u (q,) in prior σ and effects beyond the baseline;
+        everywhere: the effects act in the reference campaign too.
         """
 
-    def aside(self) -> AbstractContextManager[None]:
-        """What is predicted inside leaves no trace: predictions begin at earlier ones, so their
-        last digits depend on what was predicted before.
+
+@dataclass(frozen=True)
+class RigWords:
+    """What is said of a rig, and how.
+
+    caveats:      what to know of the comparison, a sentence each.
+    shortcomings: what these runs cannot show for want of a condition or a channel, likewise.
+    menu:         what may be driven next.
+    law:          how a misfit without a name is expressed; None where the rig has no such effect.
+    """
+
+    caveats: tuple[str, ...]
+    menu: Menu
+    shortcomings: tuple[str, ...] = ()
+    law: LawForm | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Recordings and what is known of the rig that they were made on.
+
+    units:      of channels and covariates.
+    effects:    the candidates.
+    new:        of each run, whether candidates act; in all where there is no reference.
+    aside:      what is predicted inside leaves no trace: predictions begin at earlier ones, so
+        their last digits depend on what was predicted before.
+    foresee:    every channel under an experiment of the menu.
+    having:     the rig with effects in both campaigns, whose parameters are constants. A candidate
+        of the same name is what is new of it.
+    reference:  the rig with the runs of the reference alone; None where there is none.
+    baseline:   effects of the configuration: the model has them already.
+    smooth:     covariates, alone or multiplied, on which a smooth misfit may depend.
+    heated:     channels that are read through the motor: only these change as it warms up.
+    slipping:   the constant that changes the slip; "" where nothing slips.
+    partial:    constants that do to some values, marked per run (n,), what another constant does to
+        all: a cheap derivative.
+    forms:      where the form of the model may be off; held: what the configuration holds of it.
+    lines:      ripples that the recordings show at their own rate; latencies: how late each channel
+        is beside the motion, told at that rate.
+    loss_of_drive: whether channel torque is motor torque less axle torque.
+    filtered:   whether prediction and recording go through the same filter, which blurs neither.
+    tabled:     whether the recordings are tables of steady states, whose scatter was drawn, white,
+        by what imported them.
+    stated_noise: standard deviation of one reading of a channel as the configuration states it.
+    unit_factors: from a parameter of the library in such a unit to what it means for this rig.
+    motion_sigma: per run, standard deviation of a prediction by what is left open of the motion.
+    unrest:     of each part that moves, per run, what every channel is predicted too low by if the
+        unrest of its speed is noise of the sensor.
+    reliefs:    of each wave of a surface that was prepared anew, per run what every channel reads
+        of it, one standard deviation.
+    """
+
+    runs: Sequence[GridRun]
+    channels: tuple[str, ...]
+    units: Mapping[str, str]
+    constants: tuple[Constant, ...]
+    effects: Mapping[str, type[Effect]]
+    new: Sequence[bool]
+    predict: Predict
+    words: RigWords
+    smooth: tuple[tuple[str, ...], ...]
+    heated: tuple[str, ...]
+    aside: Callable[[], AbstractContextManager[None]] = nullcontext
+    foresee: Callable[[str, Array, Sequence[Effect]], Foreseen] = _nothing_foreseen
+    having: Callable[[Sequence[ConfiguredEffect]], Rig] | None = None
+    reference: Callable[[], Rig] | None = None
+    baseline: tuple[Effect, ...] = ()
+    slipping: str = ""
+    partial: Mapping[str, tuple[str, Sequence[Bools]]] = field(default_factory=dict)
+    forms: tuple[FormSource, ...] = ()
+    held: Held | None = None
+    lines: Lines = NO_LINES
+    latencies: Sequence[Latency] = ()
+    loss_of_drive: bool = False
+    filtered: bool = False
+    tabled: bool = False
+    stated_noise: Mapping[str, float] = field(default_factory=dict)
+    unit_factors: Mapping[str, float] = field(default_factory=dict)
+    motion_sigma: Sequence[Channels] = ()
+    unrest: Sequence[Sequence[Channels]] = ()
+    reliefs: Sequence[Sequence[Channels]] = ()
+
+    def recorded(self, channel: str) -> tuple[str, ...]:
+        """The channels as recorded that this one is compared as: itself, or both sides of what the
+        drive loses.
         """
-
-    def unit_factor(self, unit: str) -> float:
-        """Factor from a parameter of the library in this unit to what it means for this rig."""
-
-    def blur(self, stack: Stack, predicted: Array) -> Array:
-        """Error (N,) of a prediction (N,) where it changes, by how motion and channels are
-        averaged, in the channels' units.
-        """
-
-    @property
-    def menu(self) -> Menu:
-        """What may be driven next."""
-
-    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen | None:
-        """Every channel under an experiment, for constants u (q,) and effects; None where the rig
-        cannot foresee it.
-        """
-
-    @property
-    def law(self) -> LawForm | None:
-        """How a misfit without a name is expressed; None where the rig has no such effect."""
-
-    @property
-    def shortcomings(self) -> Sequence[str]:
-        """What these runs cannot show for want of a condition or a channel, a sentence each."""
+        lost = self.loss_of_drive and channel == "torque"
+        return ("torque", "axle_torque") if lost else (channel,)

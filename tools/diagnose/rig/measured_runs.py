@@ -38,7 +38,7 @@ def measured_run(
     sinkage: the predicted one (n,) [m], as a covariate.
     idle:    where channel torque is motor torque less axle torque, the values (n,) at which it is
              the motor's alone; else None.
-    tabled:  whether the recording is a table of steady states.
+    tabled:  whether the recordings are tables of steady states.
     """
     constant = settings.drive.torque_constant.value
     measured = {c: measured_of(signals, c, constant) for c in channels}
@@ -50,19 +50,17 @@ def measured_run(
     along["sinkage"] = sinkage
 
     driving, resting, lifted = states(motion, settings)
-    still = {"torque": driving | resting | lifted}
-    if not tabled:
-        still["torque"] |= turned_back(motion, settings)
+    turned = np.zeros(driving.size, bool) if tabled else turned_back(motion, settings)
+    still = {"torque": driving | resting | lifted | turned}
+    alone = np.zeros(driving.size, bool) if idle is None else idle
     if idle is not None:
         still["axle_torque"] = driving | idle
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
     used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in channels}
-    alone = dict.fromkeys(channels, np.zeros(known.size))
-    if idle is not None:
-        alone["torque"] = idle.astype(float)
-    return GridRun(signals.name, np.asarray(motion.time), measured, used, along, alone)
+    marks = (alone.astype(float), (turned & ~driving).astype(float))
+    return GridRun(signals.name, np.asarray(motion.time), measured, used, along, *marks)
 
 
 def idle_values(

@@ -16,7 +16,7 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.constants import LEAN
-from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index
+from gritd.tools.diagnose.rig.interface import Bools, Channels, Constant, Foreseen, Index
 from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
@@ -59,7 +59,8 @@ class Prediction:
 
     prepared: soil constants that a bed prepared anew has for itself; there is a constant `new_NAME`
     of each. idle: where channel torque is compared as motor torque less axle torque, the values of
-    each run (n,) at which it is compared alone; else None.
+    each run (n,) at which it is compared alone; else None. means: of each run, what is added to
+    every channel (n,); else None.
     """
 
     def __init__(
@@ -70,8 +71,10 @@ class Prediction:
         driven: Driven,
         prepared: Sequence[str],
         idle: Sequence[Bools] | None,
+        means: Sequence[Channels] | None,
     ) -> None:
         self._settings, self._channels, self._constants = settings, channels, constants
+        self._means = None if means is None else [np.array([m[c] for c in channels]) for m in means]
         self._driven, self._prepared = driven, prepared
         self._less_axle = None if idle is None else ~np.concatenate(idle)
         self._campaigns = _campaigns(driven, settings, channels)
@@ -98,9 +101,9 @@ class Prediction:
                 self._true_readings = readings
 
     def channels(
-        self, u: Array, effects: Sequence[Effect], everywhere: bool
+        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
-        """Channels (n,) of each run, for constants u (q,) in prior σ; see interface.Rig.predict."""
+        """See interface.Predict."""
         value = self._values(u)
         baseline = self._baseline(value)
 
@@ -110,12 +113,12 @@ class Prediction:
             true.append(self._true(value, acting, new, campaign))
 
         read = self._read(np.hstack(true), value)
+        if self._means is not None:
+            read += np.hstack(self._means)
         return [dict(zip(self._channels, read[:, part], strict=True)) for part in self._parts]
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
-        """Channels under a proposed experiment (see proposals.py), for constants u (q,) and
-        effects as fitted.
-        """
+        """See interface.Rig: constants u (q,), effects as fitted."""
         value = self._values(u)
         sensed = simulate_arrays(
             self._settings.wheel,

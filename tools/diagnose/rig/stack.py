@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Index, Rig
+from gritd.tools.diagnose.rig.interface import Bools, Channels, Index, Rig
 
 
 class Stack:
@@ -27,7 +27,7 @@ class Stack:
         self.time: Array = self.joined([{c: run.time for c in rig.channels} for run in rig.runs])
         self.size = int(sum(sizes))
 
-    def joined(self, values: Sequence[Mapping[str, Array]]) -> Array:
+    def joined(self, values: Sequence[Channels]) -> Array:
         """Values (n,) per run and channel as one vector (N,)."""
         pieces = [values[n][c][mask] for (c, n), mask in zip(self.parts, self._masks, strict=True)]
         return np.concatenate(pieces) if pieces else np.zeros(0)
@@ -39,9 +39,11 @@ class Stack:
         if name == "run":
             began = [run.time[0] for run in self.rig.runs]
             return (np.argsort(np.argsort(began, kind="stable"))[self.run] + 1).astype(float)
-        return self.joined(
-            [dict.fromkeys(self.rig.channels, run.covariates[name]) for run in self.rig.runs]
-        )
+        return self._by_run([run.covariates[name] for run in self.rig.runs])
+
+    def _by_run(self, values: Sequence[Array]) -> Array:
+        """(N,) of values (n,) per run that all channels have."""
+        return self.joined([dict.fromkeys(self.rig.channels, own) for own in values])
 
     @cached_property
     def measured(self) -> Array:
@@ -56,13 +58,20 @@ class Stack:
 
     @cached_property
     def idle(self) -> Bools:
-        """Marks the values (N,) at which a torque is the motor's alone: see Run."""
-        return np.asarray(self.joined([run.idle for run in self.rig.runs]), bool)
+        """Marks the values (N,) at which a torque is the motor's alone: see GridRun."""
+        return self.of("torque") & (self._by_run([run.idle for run in self.rig.runs]) > 0.0)
+
+    @cached_property
+    def turned(self) -> Bools:
+        """Marks the values (N,) after a reversal: see GridRun."""
+        marked: Bools = self._by_run([run.turned for run in self.rig.runs]) > 0.0
+        return marked
 
     @cached_property
     def motion_sigma(self) -> Array:
         """(N,) in the channels' units: see Rig.motion_sigma."""
-        return self.joined(self.rig.motion_sigma)
+        told = self.rig.motion_sigma
+        return self.joined(told) if told else np.zeros(self.size)
 
     @cached_property
     def unrest(self) -> Array:
@@ -74,7 +83,12 @@ class Stack:
         """Columns (N, k) in the channels' units: see Rig.reliefs; those that act."""
         return self._columns(self.rig.reliefs)
 
-    def _columns(self, parts: Sequence[Sequence[Mapping[str, Array]]]) -> Array:
+    @cached_property
+    def doubts(self) -> Array:
+        """Columns (N, k) in the channels' units: see Held.doubts; those that act."""
+        return self._columns(self.rig.held.doubts if self.rig.held else ())
+
+    def _columns(self, parts: Sequence[Sequence[Channels]]) -> Array:
         columns = [self.joined(part) for part in parts]
         return np.column_stack([np.zeros((self.size, 0)), *(c for c in columns if np.any(c))])
 
@@ -114,13 +128,12 @@ class Stack:
         out = {}
         for name, (whole, masks) in self.rig.partial.items():
             share = sigma[place[name]] / sigma[place[whole]]
-            marked = self.joined(
-                [dict.fromkeys(self.rig.channels, np.where(mask, share, 0.0)) for mask in masks]
-            )
+            marked = self._by_run([np.where(mask, share, 0.0) for mask in masks])
             out[place[name]] = place[whole], marked
         return out
 
     def of(self, channel: str) -> Bools:
-        """Marks the values of a channel (N,)."""
-        mask: Bools = self.channel == self.rig.channels.index(channel)
+        """Marks the values of a channel (N,), which the rig may not have."""
+        channels = self.rig.channels
+        mask: Bools = self.channel == (channels.index(channel) if channel in channels else -1)
         return mask

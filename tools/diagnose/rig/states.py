@@ -66,12 +66,6 @@ def turned_back(motion: Motion, settings: Settings) -> Bools:
     return turned
 
 
-def after_reversal(motion: Motion, settings: Settings) -> Bools:
-    """Where the wheel has turned back and not settled yet (n,)."""
-    after: Bools = turned_back(motion, settings) & ~states(motion, settings)[0]
-    return after
-
-
 def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     """Where both speeds (n,) [m/s] are 0 but for the encoders' noise: a standing wheel's slip means
     nothing.

@@ -8,12 +8,25 @@ from dataclasses import dataclass
 from gritd.tools.diagnose.tuning.field import tuned
 
 SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95, 0.99)
+DAMPED = "damping of a mean over an interval"
 CELLS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
 
 
 @dataclass(frozen=True)
 class NoiseTuning:
     """What counts as noise in the recordings."""
+
+    # --- blur.py ---
+    bend: float = tuned(
+        0.5, "-", "share of the bend between neighbours: speeds are slopes over three intervals"
+    )
+    shallow: float = tuned(0.0005, "m", "a sinkage below which its changes mean little")
+    lag: float = tuned(
+        0.015, "s", "an axle sinks later than in the balance: its damping carries load meanwhile"
+    )
+    taken_up: float = tuned(
+        0.3, "-", "of the axle's torque: open after a reversal, which falls inside an interval"
+    )
 
     # --- colour.py ---
     fast_time: float = tuned(1.5, "intervals", "correlation time of the fast part")
@@ -69,6 +82,12 @@ class NoiseTuning:
 
     # --- lines.py ---
     stretch: float = tuned(40.0, "s", "for which a wave keeps its phase at least")
+    line_density: float = tuned(
+        2.0, "-", "frequencies tried in each that the longest stretch resolves"
+    )
+    line_nyquist: float = tuned(0.35, "-", "of the grid's rate: faster waves are damped", DAMPED)
+    most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
+    long_waves: int = tuned(6, "waves", "of the bed that are too long to have neighbours, at most")
 
     # --- replicates.py ---
     cell_widths: Mapping[str, float] = tuned(

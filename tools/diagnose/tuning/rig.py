@@ -36,15 +36,6 @@ class RigTuning:
     )
     first_rate: float = tuned(1.0, "Hz", "grid on which the length of the recordings is found")
 
-    # --- blur.py ---
-    bend: float = tuned(
-        0.5, "-", "share of the bend between neighbours: speeds are slopes over three intervals"
-    )
-    shallow: float = tuned(0.0005, "m", "a sinkage below which its changes mean little")
-    lag: float = tuned(
-        0.015, "s", "an axle sinks later than in the balance: its damping carries load meanwhile"
-    )
-
     # --- campaign.py ---
     quadrature_order: int = tuned(
         6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
@@ -167,9 +158,6 @@ class RigTuning:
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
     hold: float = tuned(1.0, "s", "weights stay for at least this long")
 
-    taken_up: float = tuned(
-        0.3, "-", "of the axle's torque: open after a reversal, which falls inside an interval"
-    )
     turned: int = tuned(
         1, "intervals", "from a reversal or a stop: the loss between two torques settles"
     )

@@ -24,8 +24,9 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.noise.colour import Colour, coloured
 from gritd.tools.diagnose.rig.full_rate import FullRate, beside_lines
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import Signals, doubt
-from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
+from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import soil_of
 
@@ -202,7 +203,7 @@ def rig_of(
     acting: Sequence[Effect],
     reference: Sequence[tuple[Signals, FullRate]] = (),
     bed: Bed = "prepared",
-) -> WheelRig:
+) -> Rig:
     """The rig of a case, its ripples given at full rate. reference: runs with nothing new."""
     every = [*reference, *record_fully(plan, acting)]
     signals, full = zip(*every, strict=True)
@@ -210,7 +211,7 @@ def rig_of(
     reads = [lambda read=read: read for read in full]
     constant, count = plan.settings.drive.torque_constant.value, len(reference)
     beside, lines = beside_lines(signals, reads, constant, count)
-    return WheelRig(beside, plan.settings, count, bed, lines=lines)
+    return wheel_rig(beside, plan.settings, count, bed, lines=lines)
 
 
 def _recorded(

@@ -18,7 +18,7 @@ from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import read_all, signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.importers.segments import DURATION, PAUSE
 
 RATE = 10.0  # [Hz]
@@ -31,7 +31,7 @@ class Judge:
     def __init__(self, recordings: Sequence[Path], configuration: Path) -> None:
         self.settings: Settings = config.load(configuration).settings
         series = [signals(r, self.settings, RATE) for r in read_all(sorted(recordings))]
-        self.rig = WheelRig(series, self.settings, read_off=False)
+        self.rig = wheel_rig(series, self.settings, read_off=False)
 
     def time(self, run: int) -> Array:
         """Seconds since the beginning of a run (n,)."""

@@ -36,7 +36,7 @@ def test_a_strength_is_as_uncertain_as_its_form_makes_it() -> None:
     x = np.array([2.0 / excess.sigma, 0.0])
     sigma = np.array([0.3 / excess.sigma, 0.1])
     model: Any = SimpleNamespace(fitted=SimpleNamespace(free=free), parameters=lambda: (x, sigma))
-    rig: Any = SimpleNamespace(unit_factor=lambda unit: 1.0)
+    rig: Any = SimpleNamespace(unit_factors={})
 
     exact = parameters(rig, model, "stribeck_friction")
     told = parameters(rig, model, "stribeck_friction", forms=0.2)

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.explain.apply import rewritten
 from gritd.tools.diagnose.explain.learnt import _ends, _parted
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -55,7 +55,7 @@ def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None
     diagnosed with it has nothing new.
     """
     first, later = ([_bent(s) for s in record(plan(seed=n, seconds=30.0), ())] for n in (3, 4))
-    found = diagnose(WheelRig(first, settings()), quick=True)
+    found = diagnose(wheel_rig(first, settings()), quick=True)
     assert found.verdict != "consistent"
     assert found.learnt is not None
 
@@ -68,10 +68,10 @@ def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None
     assert by_name["drawbar_pull"] is not None and by_name["drawbar_pull"].size > 0.0
 
     known = replace(applied.settings, effects=())
-    rig = WheelRig(later, known)
+    rig = wheel_rig(later, known)
     assert rig.held is not None and "torque" not in rig.channels
     assert diagnose(rig, quick=True).verdict == "consistent"
-    without = WheelRig(later, replace(known, discrepancy=None))
+    without = wheel_rig(later, replace(known, discrepancy=None))
     assert diagnose(without, quick=True).verdict != "consistent"
 
     # a little more of what is off already is no news; much more is
@@ -81,4 +81,4 @@ def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None
 
 def _verdict(by: float, known: Settings) -> str:
     runs = [_bent(s, by) for s in record(plan(seed=4, seconds=30.0), ())]
-    return diagnose(WheelRig(runs, known), quick=True).verdict
+    return diagnose(wheel_rig(runs, known), quick=True).verdict

@@ -19,7 +19,8 @@ from gritd.tools.diagnose.explain.result import Location
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
 from gritd.tools.proof.ours.cases import draw, record
 from gritd.tools.proof.ours.unlisted import NextDoor
@@ -30,7 +31,7 @@ pytestmark = pytest.mark.long
 PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
 
 
-def prepared(rig: WheelRig) -> Screening:
+def prepared(rig: Rig) -> Screening:
     return prepare_screening(fit_base(rig))
 
 
@@ -59,7 +60,7 @@ def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Loc
         )
         drawn = replace(drawn, motions=tuple(again))
     effect = make(name, parameters)
-    screening = prepared(WheelRig(record(drawn, (effect,)), drawn.settings))
+    screening = prepared(wheel_rig(record(drawn, (effect,)), drawn.settings))
     held = unmoved(screening, explained(screening, effect))
     return locate(screening, held, held.fitted.predicted)
 
@@ -68,7 +69,7 @@ def test_a_mean_is_not_told_as_a_small_wave_about_it() -> None:
     drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
     friction = make("coulomb_friction", {"loss": 1.2})
     ripple = make("gear_ripple", {"ripple_cos": 0.1, "order": 23.0})
-    screening = prepared(WheelRig(record(drawn, (friction, ripple)), drawn.settings))
+    screening = prepared(wheel_rig(record(drawn, (friction, ripple)), drawn.settings))
     held = unmoved(screening, explained(screening, friction))
     first = locate(screening, held, held.fitted.predicted)[0]
     assert first.covariate == "constant"
@@ -120,7 +121,7 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
     """
     effect = NextDoor(size=0.3)
     drawn = plan(seed=3)
-    screening = prepared(WheelRig(record(drawn, (effect,)), drawn.settings))
+    screening = prepared(wheel_rig(record(drawn, (effect,)), drawn.settings))
     accepted = explained(screening, effect)
     held = unmoved(screening, accepted)
 
@@ -139,6 +140,6 @@ def test_noise_alone_has_no_change_points() -> None:
     alarms = 0
     for seed in range(40):
         drawn = draw(settings, np.random.default_rng(seed))
-        screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
+        screening = prepared(wheel_rig(record(drawn, ()), drawn.settings))
         alarms += any(place.changes for place in locate(screening, screening.base))
     assert alarms <= 2

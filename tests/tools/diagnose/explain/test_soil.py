@@ -21,7 +21,7 @@ from gritd.tools.diagnose.fit.model import Model, sized_model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Constant
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -70,7 +70,7 @@ def _fitted() -> tuple[Problem, Model]:
     """A rig whose reference showed that it pushes soil."""
     shown = ConfiguredEffect("bulldozing", {"share": Uncertain(1.0, 1.0)})
     runs = record(plan(seconds=24.0), (make("bulldozing", {"share": 1.0}),))
-    rig = WheelRig(runs, settings()).having((shown,))
+    rig = wheel_rig(runs, settings()).having((shown,))
     base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
     none = tuple(0 for _ in forms)

@@ -8,7 +8,7 @@ import pytest
 from gritd.tools.diagnose.explain.wording import sentence
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan
 
@@ -18,7 +18,7 @@ BY_RUN = Shape("torque", ("run",), "smooth")
 @pytest.fixture(scope="module")
 def stack() -> Stack:
     drawn = plan(standstill=False)
-    return Stack(WheelRig(record(drawn, []), drawn.settings))
+    return Stack(wheel_rig(record(drawn, []), drawn.settings))
 
 
 def test_a_misfit_that_is_one_in_every_run_is_told_once(stack: Stack) -> None:

@@ -17,7 +17,7 @@ from gritd.tools.diagnose.fit.form_error import _following, form_errors, had_fre
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import diagnosed, plan, settings
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.long
 @cache
 def _stack() -> Stack:
     runs = record(plan(seed=3, seconds=40.0), (make("grousers", {"grip": 0.2}),))
-    return Stack(WheelRig(runs, settings()))
+    return Stack(wheel_rig(runs, settings()))
 
 
 @cache

@@ -13,7 +13,7 @@ from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.tuning import replaced
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
@@ -25,7 +25,7 @@ PEAK = EFFECTS["stress_peak_shift"]
 def shifted() -> BaseFit:
     """A stress peak three expected sizes off: without the effect, constants are strained far."""
     acting = (make("stress_peak_shift", {"share": -0.3}),)
-    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     return fit_base(rig)
 
 
@@ -52,7 +52,7 @@ def test_a_fit_stands_where_its_evidence_is_told() -> None:
     would be told from there.
     """
     acting = (make("slip_sinkage", {"growth": 0.4}),)
-    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
 
@@ -73,7 +73,7 @@ def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() ->
     """
     both = (EFFECTS["side_slip"], EFFECTS["pulley_slip"])
     acting = (make("side_slip", {"angle": 0.3}),)
-    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig)
     forms = form_freedoms(base.problem.stack, base.problem.noise)
 

@@ -17,7 +17,7 @@ from gritd.tools.diagnose.fit.shared import (
     without_ripples,
 )
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -38,9 +38,9 @@ def _columns(acting: tuple[Any, ...], seed: int, seconds: float = 60.0) -> tuple
     before, after = (
         record(plan(seed=s, seconds=seconds, standstill=False), acting) for s in (seed, seed + 1)
     )
-    stack = Stack(WheelRig([*before, *after], settings(), len(before), "same"))
+    stack = Stack(wheel_rig([*before, *after], settings(), len(before), "same"))
     smooth = Stack(
-        WheelRig(
+        wheel_rig(
             [*record(plan(seed=seed, seconds=seconds, standstill=False), ())] * 2,
             settings(),
             3,

@@ -19,7 +19,7 @@ from gritd.tools.diagnose.noise import replicates
 from gritd.tools.diagnose.noise.colour import Colour
 from gritd.tools.diagnose.rig.constants import UNITS
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import RATE, Plan, record
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from tests.tools.diagnose.campaigns import group, plan, settings
@@ -166,7 +166,7 @@ def drifting(signals: list[Signals], size: float) -> list[Signals]:
 
 
 def found_in(drawn: Plan, effect: tuple[Any, ...] = (), drift: float = 0.0) -> Diagnosis:
-    return diagnose(WheelRig(drifting(list(record(drawn, effect)), drift), drawn.settings))
+    return diagnose(wheel_rig(drifting(list(record(drawn, effect)), drift), drawn.settings))
 
 
 @pytest.mark.slow

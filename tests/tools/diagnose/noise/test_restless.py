@@ -9,7 +9,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, Noise
 from gritd.tools.diagnose.noise.estimate import restless
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -17,7 +17,7 @@ from tests.tools.diagnose.campaigns import plan, settings
 @pytest.fixture(scope="module")
 def stack() -> Stack:
     runs = record(plan(seed=3, seconds=40.0, standstill=False), ())
-    return Stack(WheelRig(runs, settings()))
+    return Stack(wheel_rig(runs, settings()))
 
 
 def _noise(stack: Stack) -> Noise:

@@ -8,7 +8,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour
 from gritd.tools.diagnose.noise.estimate import spikes
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -22,7 +22,7 @@ def _spikes(residual: Array, *columns: Array) -> Array:
 
 
 def _stack() -> Stack:
-    return Stack(WheelRig(record(plan(), ()), settings()))
+    return Stack(wheel_rig(record(plan(), ()), settings()))
 
 
 def _standing_off(*places: int) -> Array:

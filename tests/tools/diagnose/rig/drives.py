@@ -12,7 +12,8 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.noise.colour import Colour, Noise
-from gritd.tools.diagnose.rig.drive import DriveRig
+from gritd.tools.diagnose.rig.drive import drive_rig
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.rig.stack import Stack
 
@@ -49,15 +50,15 @@ def force(speed: Array, acceleration: Array) -> Array:
     return np.asarray(INERTIA * acceleration + DAMPING * speed + LOSS * np.sign(speed))
 
 
-def rig(series: dict[str, Series]) -> DriveRig:
+def rig(series: dict[str, Series]) -> Rig:
     settings = config.load(packaged()).settings
     one = replace(
         settings.drive, torque_constant=replace(settings.drive.torque_constant, value=1.0)
     )
-    return DriveRig([series], ["to and fro"], replace(settings, drive=one))
+    return drive_rig([series], ["to and fro"], replace(settings, drive=one))
 
 
-def fitted(made: DriveRig) -> dict[str, float]:
+def fitted(made: Rig) -> dict[str, float]:
     stack = Stack(made)
     effects = [EFFECTS[name] for name in EFFECTS_OF_FRICTION]
     noise = Noise(stack, (Colour(0.1, 0.5, 0.0),), np.zeros(stack.size), np.zeros((stack.size, 0)))
@@ -68,5 +69,6 @@ def fitted(made: DriveRig) -> dict[str, float]:
     constants = {k.name: k.of(float(u)) for k, u in zip(made.constants, found.u, strict=True)}
     values = zip(found.free, found.x, strict=True)
     return constants | {
-        f.parameter.name: f.value(float(x)) * made.unit_factor(f.parameter.unit) for f, x in values
+        f.parameter.name: f.value(float(x)) * made.unit_factors.get(f.parameter.unit, 1.0)
+        for f, x in values
     }

@@ -14,7 +14,7 @@ from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.rig.candidates import candidates, steady_states
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -50,8 +50,8 @@ def _steady(run: Signals) -> Signals:
 
 def test_the_scatter_of_a_table_is_no_sensors(driven: list[Signals]) -> None:
     """An importer drew it, so nothing is said of how loud it is."""
-    assert WheelRig(driven, settings()).stated_noise
-    assert not WheelRig([tabled(run) for run in driven], settings()).stated_noise
+    assert wheel_rig(driven, settings()).stated_noise
+    assert not wheel_rig([tabled(run) for run in driven], settings()).stated_noise
 
 
 def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:
@@ -73,7 +73,7 @@ def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[
 def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals]) -> None:
     """Its scatter was drawn by an importer: trends, places and ripples of it are nobody's."""
     told = [replace(run, info=replace(run.info, steady_states=True)) for run in driven]
-    rig, as_driven = WheelRig(told, settings()), WheelRig(driven, settings())
+    rig, as_driven = wheel_rig(told, settings()), wheel_rig(driven, settings())
     assert "gear_ripple" in as_driven.effects and "gear_ripple" not in rig.effects
     assert highest_order(Stack(as_driven)) > 0.0 == highest_order(Stack(rig))
     along = {along for s in smooth_signatures(Stack(rig)) for along in s.shape.along}
@@ -85,7 +85,7 @@ def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals
 
 
 def test_lugs_dig_and_grip_in_a_table_without_a_count(driven: list[Signals]) -> None:
-    rig = WheelRig([tabled(run) for run in driven], settings())
+    rig = wheel_rig([tabled(run) for run in driven], settings())
     free = [f.parameter.name for f in free_of((rig.effects["grousers"],))]
     assert free == ["height", "grip", "rise", "digging", "growth", "share"]
     lugs = rig.effects["grousers"](digging=5e-3)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.cli.command import CommandError
+from gritd.tools.diagnose.noise.blur import blur_of
 from gritd.tools.diagnose.rig.stack import Stack
 from tests.tools.diagnose.rig.drives import (
     DAMPING,
@@ -47,7 +48,7 @@ def test_reversals_count_but_a_drive_at_rest_does_not() -> None:
 
 def test_what_both_sides_are_filtered_by_blurs_neither() -> None:
     stack = Stack(rig(log()))
-    assert not stack.rig.blur(stack, stack.measured).any()
+    assert not blur_of(stack, stack.measured).any()
 
 
 def test_a_log_that_is_too_short_is_refused_in_one_line() -> None:

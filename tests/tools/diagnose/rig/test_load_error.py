@@ -10,7 +10,7 @@ import pytest
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.load_error import changes_of, error_of_level
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
@@ -69,7 +69,7 @@ def test_slow_noise_of_the_measured_load_raises_no_alarm(noise: float, seed: int
     """
     rng = np.random.default_rng(seed)
     runs = [_weighed(s, noise, rng) for s in record(plan(loads=(20.0, 35.0, 100.0)), [])]
-    rig = WheelRig(runs, settings())
+    rig = wheel_rig(runs, settings())
     assert "load" not in rig.channels
 
     base = fit_base(rig)

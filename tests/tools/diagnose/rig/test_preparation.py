@@ -10,7 +10,7 @@ import pytest
 from gritd.estimator.config.settings import BedSettings, Repeatability
 from gritd.tools.diagnose.rig.constants import preparation
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
+from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
@@ -52,4 +52,4 @@ def test_a_bed_that_was_not_touched_keeps_its_surface() -> None:
 
 def _beside_a_reference(bed: Bed, surface: float = 0.0) -> Stack:
     known = replace(settings(), bed=BedSettings("bin", Repeatability(surface=surface)))
-    return Stack(WheelRig(record(plan(), ()) * 2, known, 1, bed))
+    return Stack(wheel_rig(record(plan(), ()) * 2, known, 1, bed))

@@ -18,9 +18,10 @@ from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, free_of
 from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.unrest import unrest_of
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -72,10 +73,10 @@ def _noisy(signals: Signals, rng: np.random.Generator) -> Signals:
     return replace(signals, wheel_speed=signals.wheel_speed * noise)
 
 
-def _noisy_rig(acting: list[Effect]) -> WheelRig:
+def _noisy_rig(acting: list[Effect]) -> Rig:
     rng = np.random.default_rng(6)
     drawn = plan(seconds=30.0, speeds=(0.02,) * 3)
-    return WheelRig([_noisy(s, rng) for s in record(drawn, acting)], settings())
+    return wheel_rig([_noisy(s, rng) for s in record(drawn, acting)], settings())
 
 
 def test_a_fit_knows_the_noise_of_the_wheels_speed() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.covered import _held, covered_share
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
@@ -29,5 +29,5 @@ def test_a_reference_at_a_far_lighter_load_covers_nothing(light: float, share: f
     """Beside 60 N a wheel under 2 N hardly touches soil: it tells nothing of the form."""
     before = record(plan(seed=3, loads=(light, light, light)), ())
     after = record(plan(seed=3, loads=(60.0, 60.0, 60.0)), ())
-    rig = WheelRig([*before, *after], settings(), len(before), "same")
+    rig = wheel_rig([*before, *after], settings(), len(before), "same")
     assert covered_share(Stack(rig)) == pytest.approx(share, abs=0.05)

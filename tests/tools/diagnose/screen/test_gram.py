@@ -13,7 +13,7 @@ from gritd.estimator.effects import make
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_bayes_alone
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, begin
@@ -24,7 +24,7 @@ from tests.tools.diagnose.campaigns import plan, settings
 @cache
 def begun() -> EffectSearch:
     """A campaign in which soil is pushed ahead of the wheel."""
-    rig = WheelRig(record(plan(), (make("bulldozing", {"share": 0.75}),)), settings())
+    rig = wheel_rig(record(plan(), (make("bulldozing", {"share": 0.75}),)), settings())
     return begin(prepare_screening(fit_base(rig)))
 
 

@@ -16,7 +16,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen import screening as module
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence, _without_first
 from gritd.tools.diagnose.screen.screening import prepare_screening
@@ -49,7 +49,7 @@ def begun(drawn: Plan, *acting: str, axle: bool = True) -> EffectSearch:
     signals = record(drawn, effects)
     if not axle:
         signals = [replace(s, analogue=_without(s.analogue, "axle_torque")) for s in signals]
-    return begin(prepare_screening(fit_base(WheelRig(signals, drawn.settings))))
+    return begin(prepare_screening(fit_base(wheel_rig(signals, drawn.settings))))
 
 
 def _without(channels: dict[str, Array], name: str) -> dict[str, Array]:

@@ -20,7 +20,7 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Colour, coloured
 from gritd.tools.diagnose.noise.saturated import Explainable
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.scans import candidates, without_harmonics
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, begin
@@ -85,7 +85,7 @@ def test_a_line_is_no_noise() -> None:
 def begun(effect: type[Effect] | None, size: float) -> EffectSearch:
     """The search after its first screen."""
     drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
-    rig = WheelRig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)
+    rig = wheel_rig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)
     return begin(prepare_screening(fit_base(rig)))
 
 

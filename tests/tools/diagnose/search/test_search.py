@@ -17,7 +17,7 @@ from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.evidence import Weighed, varied_pass
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search import search as searching
@@ -40,7 +40,7 @@ pytestmark = pytest.mark.long
 
 def searched(acting: Effect | None, **given: Any) -> EffectSearch:
     """Recordings in which an effect acts, or none, after the first pass."""
-    rig = WheelRig(record(plan(**given), (acting,) if acting else ()), settings())
+    rig = wheel_rig(record(plan(**given), (acting,) if acting else ()), settings())
     return begin(prepare_screening(fit_base(rig)))
 
 
@@ -99,7 +99,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
 
 def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:
     """A count that leaves its line in the fit is another ripple."""
-    rig = WheelRig(
+    rig = wheel_rig(
         record(plan(), (make("gear_ripple", {"order": 15.0, "ripple_cos": 0.3}),)), settings()
     )
     kind = rig.effects["gear_ripple"]

@@ -14,8 +14,9 @@ from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.method import first_answer, fit_base
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
 from gritd.tools.diagnose.verdict.baseline import baseline_effects
@@ -39,10 +40,10 @@ HAD = ConfiguredEffect(
 )
 
 
-def pair() -> WheelRig:
+def pair() -> Rig:
     """Two campaigns of three runs, nothing acting."""
     before, after = record(plan(seed=3), ()), record(plan(seed=4), ())
-    return WheelRig([*before, *after], settings(), len(before), "same")
+    return wheel_rig([*before, *after], settings(), len(before), "same")
 
 
 def test_it_acts_in_both_and_its_parameters_are_constants() -> None:
@@ -78,9 +79,9 @@ def test_the_reference_alone_is_its_runs_and_a_campaign_without_one_has_none() -
             np.testing.assert_array_equal(own.measured[channel], run.measured[channel])
 
 
-def decided(*effects: Effect, quick: bool = True) -> tuple[WheelRig, Decision]:
+def decided(*effects: Effect, quick: bool = True) -> tuple[Rig, Decision]:
     """On a campaign without a reference."""
-    rig = WheelRig(record(plan(seed=3), effects), settings())
+    rig = wheel_rig(record(plan(seed=3), effects), settings())
     with first_answer() if quick else nullcontext():
         return rig, decide(search_models(prepare_screening(fit_base(rig))))
 

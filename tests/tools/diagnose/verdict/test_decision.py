@@ -24,7 +24,7 @@ from gritd.tools.diagnose.fit.nuisance import Allowance
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
 from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict import decide, resemblance
@@ -36,7 +36,7 @@ from tests.tools.diagnose.campaigns import plan, settings
 
 def _model(acting: Sequence[Effect], name: str) -> Model:
     """A listed effect fitted to recordings in which something acts."""
-    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig)
     free = free_of((EFFECTS[name],))
     start = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])

@@ -11,7 +11,7 @@ import pytest
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.salvage import read
 from gritd.tools.commands.import_rig import main
-from gritd.tools.diagnose.rig.drive import DriveRig
+from gritd.tools.diagnose.rig.drive import drive_rig
 from gritd.tools.diagnose.rig.signals import drive_series
 from gritd.tools.proof.real import chrono, cmu, ding, emps, mgst
 from gritd.tools.proof.real.bench import CommandBench
@@ -33,7 +33,7 @@ def test_the_adapter_of_a_drive_recovers_the_published_parameters(tmp_path: Path
     assert main(["emps", str(REAL / "emps" / "DATA_EMPS.mat"), "-o", str(tmp_path)]) == 0
     settings = config.load(tmp_path / "emps.yaml").settings
     found = fitted(
-        DriveRig([drive_series(read(tmp_path / "data-emps.mcap"), settings)], ["EMPS"], settings)
+        drive_rig([drive_series(read(tmp_path / "data-emps.mcap"), settings)], ["EMPS"], settings)
     )
     for name, (value, _) in zip(
         ("inertia", "damping", "loss"), emps.PUBLISHED.values(), strict=True

@@ -2,50 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
 def blur_of(stack: Stack, predicted: Array) -> Array:
-    """Error (N,) where a prediction (N,) changes, in the channels' units.
+    """Error (N,) where a prediction (N,) changes, in the channels' units; nothing where prediction
+    and recording go through the same filter.
 
     Averaging takes a share of the second difference, a value's or its neighbours'; and a lagging
     axle shifts all forces by the share by which the sinkage changes within the lag.
     """
-    gaps = np.where(np.isfinite(stack.gaps), stack.gaps, np.inf)
+    if stack.rig.filtered:
+        return np.zeros(stack.size)
     bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
     edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))
 
-    late = np.abs(np.diff(predicted, prepend=predicted[:1])) / gaps
-    depth = np.log(np.maximum(stack.covariate("sinkage"), TUNING.rig.shallow))
-    late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / gaps
+    late = np.abs(np.diff(predicted, prepend=predicted[:1])) / stack.gaps
+    depth = np.log(np.maximum(stack.covariate("sinkage"), TUNING.noise.shallow))
+    late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / stack.gaps
 
-    return np.asarray(
-        np.hypot(
-            TUNING.rig.bend * _nearby(np.where(edge, 0.0, bend)), TUNING.rig.lag * _nearby(late)
-        )
-    )
+    bent = TUNING.noise.bend * _nearby(np.where(edge, 0.0, bend))
+    blur = np.hypot(bent, TUNING.noise.lag * _nearby(late))
+    return np.hypot(blur, _of_reversal(stack, predicted))
 
 
-def blur_of_reversal(stack: Stack, predicted: Array, after: Sequence[Bools]) -> Array:
+def _of_reversal(stack: Stack, predicted: Array) -> Array:
     """Error (N,) of channel torque [N·m] after a reversal: that falls inside an interval, and soil
-    takes the axle's torque up over some way. A part of that is open. after: per run, values (n,)
-    after a reversal.
+    takes the axle's torque up over some way. A part of that is open.
     """
-    rig = stack.rig
-    marked = stack.joined([dict.fromkeys(rig.channels, at.astype(float)) for at in after]) > 0.0
-    known = np.full(predicted.size, np.nan)
+    rig, axle = stack.rig, np.abs(predicted)
     if "axle_torque" in rig.channels:
         read = [np.abs(run.measured["axle_torque"]) for run in rig.runs]
         known = stack.joined([dict.fromkeys(rig.channels, values) for values in read])
-    axle = np.where(np.isfinite(known), known, np.abs(predicted))
-    return np.where(marked & stack.of("torque"), TUNING.rig.taken_up * axle, 0.0)
+        axle = np.where(np.isfinite(known), known, axle)
+    return np.where(stack.turned & stack.of("torque"), TUNING.noise.taken_up * axle, 0.0)
 
 
 def _nearby(values: Array) -> Array:

@@ -29,7 +29,7 @@ from gritd.tools.diagnose.explain.result import (
     SoilFit,
     Test,
 )
-from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
+from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.summary import summary
 from gritd.tools.diagnose.explain.traces import scatters, traces
@@ -95,7 +95,6 @@ def explain(
             for w in decision.weighed
         ),
         lines=ripples_of(rig),
-        latencies=latencies_of(rig),
         candidates=len(rig.effects),
         learnt=learnt,
         baseline=tuple(e.name for e in rig.baseline),
@@ -283,7 +282,6 @@ def _caveats(
         *rig.words.shortcomings,
         *doubts(rig, whole, problem.noise),
         *left_over(rig, acting),
-        *late(rig, acting),
     )
 
 

@@ -243,19 +243,6 @@ class Ripple:
 
 
 @dataclass(frozen=True)
-class Late:
-    """How late a channel is beside the motion, around starts, stops and changes: by a time [s] at
-    any speed, and by a length of travel [m]. sure: whether the time is more than chance.
-    """
-
-    channel: str
-    delay: Quantity
-    length: Quantity
-    events: int
-    sure: bool
-
-
-@dataclass(frozen=True)
 class Explanation:
     """One of those that compete: listed effects, the discrepancy of form alone where there are
     none, unexplained terms beside them where `nameless`. evidence: [nats] above the
@@ -340,7 +327,7 @@ class Diagnosis:
     reference: Reference | None = None  # the campaign in which nothing is new
     explanations: tuple[Explanation, ...] = ()  # all that were weighed
     lines: tuple[Ripple, ...] = ()  # at the recordings' own rate
-    latencies: tuple[Late, ...] = ()  # likewise
+    latencies: tuple[()] = ()  # none is told apart from the fit: see `delay` of the nuisance
     candidates: int = 0  # listed effects that were considered
     # the discrepancy of form as a configuration holds it; not in the JSON
     learnt: LearntForm | None = None

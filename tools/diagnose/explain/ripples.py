@@ -1,5 +1,5 @@
-"""Ripples, vibrations and latencies that the recordings show at their own rate, and those left
-without a name.
+"""Ripples and vibrations that the recordings show at their own rate, and those left without a
+name.
 """
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gritd.estimator.effects.base import Effect, order_of
-from gritd.tools.diagnose.explain.result import Late, Quantity, Ripple
+from gritd.tools.diagnose.explain.result import Ripple
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
@@ -34,33 +34,6 @@ def _told(rig: Rig, line: SpectralLine) -> Ripple:
         line.harmonic or None,
         rig.lines.shared(line),
     )
-
-
-def latencies_of(rig: Rig) -> tuple[Late, ...]:
-    """Of every channel that follows the motion often enough."""
-    return tuple(
-        Late(
-            x.channel,
-            Quantity(x.delay, x.delay_sigma, "s"),
-            Quantity(x.length, x.length_sigma, "m"),
-            x.events,
-            x.sure,
-        )
-        for x in rig.latencies
-    )
-
-
-def late(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
-    """A sentence for each channel that is late for sure, where no accepted effect is a latency."""
-    if any(effect.name == "sensor_latency" for effect in accepted):
-        return
-    for x in rig.latencies:
-        if x.sure:
-            yield (
-                f"Channel {x.channel} {'lags' if x.delay > 0.0 else 'leads'} the motion by"
-                f" {abs(x.delay):.3f} ± {x.delay_sigma:.3f} s at {x.events} starts, stops and"
-                " changes, whatever the speed. No accepted effect is a latency."
-            )
 
 
 def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:

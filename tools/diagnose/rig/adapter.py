@@ -11,7 +11,6 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.rig.latencies import latencies_in
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
 from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
@@ -65,9 +64,8 @@ def _wheel_rig(
     means = [signals(r, settings, rate) for r in ordered]
 
     beside, lines = with_lines(ordered, means, settings, len(reference))
-    late = latencies_in(ordered[len(reference) :], means[len(reference) :], settings)
 
-    rig = wheel_rig(beside, settings, len(reference), bed, lines=lines, latencies=late)
+    rig = wheel_rig(beside, settings, len(reference), bed, lines=lines)
     for new, each in ((False, reference), (True, recordings)):
         _check_drives(rig, new, each)
     return rig, rate

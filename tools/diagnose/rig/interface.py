@@ -20,7 +20,6 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.discrepancy import Usual
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
-from gritd.tools.diagnose.orders.latency import Latency
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
@@ -223,8 +222,7 @@ class Rig:
     partial:    constants that do to some values, marked per run (n,), what another constant does to
         all: a cheap derivative.
     forms:      where the form of the model may be off; held: what the configuration holds of it.
-    lines:      ripples that the recordings show at their own rate; latencies: how late each channel
-        is beside the motion, told at that rate.
+    lines:      ripples that the recordings show at their own rate.
     loss_of_drive: whether channel torque is motor torque less axle torque.
     filtered:   whether prediction and recording go through the same filter, which blurs neither.
     tabled:     whether the recordings are tables of steady states, whose scatter was drawn, white,
@@ -258,7 +256,6 @@ class Rig:
     forms: tuple[FormSource, ...] = ()
     held: Held | None = None
     lines: Lines = NO_LINES
-    latencies: Sequence[Latency] = ()
     loss_of_drive: bool = False
     filtered: bool = False
     tabled: bool = False

@@ -16,7 +16,6 @@ from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.terramechanics.soil import Soil
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
-from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.orders.phases import guide
 from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
@@ -98,7 +97,6 @@ def wheel_rig(
     bed: Bed = "prepared",
     read_off: bool = True,
     lines: Lines = NO_LINES,
-    latencies: Sequence[Latency] = (),
     had: Sequence[ConfiguredEffect] = (),
 ) -> Rig:
     """A wheel in soil.
@@ -106,11 +104,11 @@ def wheel_rig(
     reference: how many of the runs, the first ones, are of a reference campaign, in which no
     candidate acts; bed: whether the others drive on the same bed or on one prepared anew;
     read_off: where both torques are measured, channel torque is the loss between them;
-    lines, latencies: what the recordings show at their own rate; had: effects beyond the
-    configured ones that the rig has in both campaigns.
+    lines: what the recordings show at their own rate; had: effects beyond the configured ones that
+    the rig has in both campaigns.
     """
     signals = to_one_side(signals)
-    again = partial(wheel_rig, signals, settings, reference, bed, read_off, lines, latencies)
+    again = partial(wheel_rig, signals, settings, reference, bed, read_off, lines)
     alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
     told = _recorded(signals, settings, reference, read_off)
     known = [effect.name for effect in settings.effects]
@@ -173,7 +171,6 @@ def wheel_rig(
         forms=_forms(told, runs, settings),
         held=held,
         lines=lines,
-        latencies=latencies,
         loss_of_drive=told.loss,
         tabled=tabled,
         stated_noise={} if tabled else noise_of_readings(settings, told.loss),

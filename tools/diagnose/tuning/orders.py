@@ -1,6 +1,4 @@
-"""Tuned numbers of tools/diagnose/orders: ripples, vibrations and latencies at the recordings' own
-rate.
-"""
+"""Tuned numbers of tools/diagnose/orders: ripples and vibrations at the recordings' own rate."""
 
 from __future__ import annotations
 
@@ -66,25 +64,3 @@ class Orders:
     two_speeds: float = tuned(1.2, "-", "fastest over slowest: one speed cannot tell a ripple")
     out_of_step: float = tuned(0.6, "rad", "of a ripple: runs that differ by less begin alike")
     sure_phase: float = tuned(6.0, "σ", "of a ripple in a run, whose phase then is known")
-
-    # --- latency.py ---
-    lag_rate: float = tuned(50.0, "Hz", "grid on which lags are estimated", "run time")
-    lag_longest: float = tuned(900.0, "s", "of a run that is looked at", "run time, memory")
-    event_reach: float = tuned(0.8, "s", "before and after a change")
-    event_change: float = tuned(0.06, "1/s", "of a channel's size: a change")
-    usual_size: float = tuned(0.9, "quantile", "of a channel's values: its size")
-    event_smooth: float = tuned(0.2, "s", "over which the rate of a change is estimated")
-    event_values: int = tuned(30, "values", "of an event at least")
-    farthest_lag: float = tuned(0.6, "s", "of an event: a later channel follows something else")
-    lag_rounds: int = tuned(6, "rounds", "of fit and shift in turn")
-    followed: float = tuned(0.9, "share", "of a channel's changes that the model must follow")
-    fast: float = tuned(
-        0.5, "-", "of the largest speed about an event: its usual speed is of these"
-    )
-    event_colour: float = tuned(
-        8.0, "-", "values that are wrong together: what a model misses about a change is slow"
-    )
-    least_events: int = tuned(6, "events", "of a channel, or nothing is reported")
-    usual_length: float = tuned(0.05, "m", "of travel over which a contact follows: prior σ")
-    lag_doubt: float = tuned(0.015, "s", "that a model of starts and stops is off by", "a balance")
-    lag_sure: float = tuned(4.0, "σ", "from which a latency is reported")

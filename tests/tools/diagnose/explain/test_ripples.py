@@ -1,4 +1,4 @@
-"""What is said of ripples, vibrations and latencies."""
+"""What is said of ripples and vibrations."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.explain.result import plain
-from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
+from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
 from gritd.tools.diagnose.orders.campaigns import Lines
-from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.wave import Amplitude
 from gritd.tools.diagnose.rig.constants import UNITS
@@ -54,12 +53,3 @@ def test_many_places_are_not_all_told() -> None:
     rig = _rig(tuple(_line("torque", "angle", 10.0 * k) for k in range(1, 10)))
     (sentence,) = left_over(rig, ())
     assert sentence.endswith("and 5 more.")
-
-
-def test_a_sure_latency_is_told_unless_an_effect_is_one() -> None:
-    sure, unsure = (Latency(c, 0.1, s, 0.0, 1e-4, 9) for c, s in (("torque", 0.01), ("load", 0.2)))
-    rig = _rig((), latencies=(sure, unsure))
-    (sentence,) = late(rig, ())
-    assert "torque lags the motion by 0.100 ± 0.010 s at 9" in sentence
-    assert list(late(rig, (make("sensor_latency", {"current": 0.1}),))) == []
-    assert [x.sure for x in latencies_of(rig)] == [True, False]

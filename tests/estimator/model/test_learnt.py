@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from gritd.estimator.model.correction import Correction, weights_of
-from gritd.estimator.model.discrepancy import CARRYING, CONDITIONS, conditions_of
+from gritd.estimator.model.discrepancy import CONDITIONS, conditions_of
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.model.learnt import CHANNELS
 from gritd.estimator.stages.situation import CREEP, situation_of
 from gritd.estimator.wheel.form import FormOnLine, Wheeling
-from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.testbed.plant import schedule
 from gritd.tools.testbed.schedule import motion_of
 from gritd.tools.testbed.simulation import soil_of
@@ -169,7 +168,3 @@ def test_a_pull_that_was_not_measured_has_no_discrepancy():
         not found.mean[:, 1].any() and not found.columns[:, 1].any() and not found.rest[:, 1].any()
     )
     assert found.mean[:, 0].any()
-
-
-def test_the_diagnosis_touches_soil_where_the_library_does():
-    assert TUNING.rig.carrying == CARRYING

@@ -21,7 +21,7 @@ def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
     """Constants far from what is known of them [σ], the farthest first."""
     told = [(c.name, float(u)) for c, u in zip(rig.constants, model.fitted.u, strict=True)]
-    far = [(name, u) for name, u in told if abs(u) >= TUNING.explain.doubtful_constant]
+    far = [(name, u) for name, u in told if abs(u) >= TUNING.explain.doubtful]
     return sorted(far, key=lambda each: -abs(each[1]))
 
 
@@ -55,7 +55,7 @@ def _loud(rig: Rig, noise: Noise) -> Iterator[str]:
         return
     for channel, colour in zip(rig.channels, noise.colours, strict=True):
         stated = rig.stated_noise.get(channel, 0.0)
-        if stated > 0.0 and colour.sigma > TUNING.explain.loud * stated:
+        if stated > 0.0 and colour.sigma > TUNING.explain.doubtful * stated:
             unit, factor = shown(rig.units[channel])
             found, of_reading = (spaced(s * factor, unit, 2) for s in (colour.sigma, stated))
             yield (

@@ -97,7 +97,7 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     best, groups = decision.best, decision.groups.values()
     same = [m for m in search.models if len(m.names) == len(best.names)]
     close = [m for m in same if any(set(m.names) - set(best.names) <= set(g) for g in groups)]
-    return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.rivals] if best.names else []
+    return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.shown] if best.names else []
 
 
 def _told_apart(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
@@ -233,9 +233,12 @@ def _slopes(
 
 
 def _values(foreseen: Foreseen) -> Array:
-    return np.concatenate(
-        [np.asarray(v)[:: TUNING.explain.foreseen_together] for v in foreseen.channels.values()]
-    )
+    return np.concatenate([np.asarray(v)[:: _apart_by()] for v in foreseen.channels.values()])
+
+
+def _apart_by() -> int:
+    """Values in a second, of which one counts: neighbours share their noise."""
+    return round(TUNING.rig.rate)
 
 
 def _gain(search: EffectSearch, here: Foreseen, change: Array, slopes: Array) -> float:
@@ -249,7 +252,7 @@ def _gain(search: EffectSearch, here: Foreseen, change: Array, slopes: Array) ->
             np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual),
             np.inf,
         )
-        sigma.append(known[:: TUNING.explain.foreseen_together])
+        sigma.append(known[:: _apart_by()])
 
     scale = np.concatenate(sigma)
     ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]

@@ -221,7 +221,7 @@ def _told(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
     explanations.
     """
     better = float((law.plain_held.log_density - form.log_density).sum()) > 0.0
-    carries = better and law.law.share > TUNING.explain.law_carries
+    carries = better and law.law.share > 1.0 - TUNING.explain.held_out_worse
     if soil is None:
         return replace(law.law, carries=carries)
     beside = constants_of(rig, law.plain, soil=True)

@@ -236,12 +236,10 @@ class _Reduced:
         """Correlations, a little less than they are, so that they hold together once rounded; the
         values are those of the file, and are put in when it is written.
         """
-        names, shrunk = self._unknowns.soil_names, TUNING.explain.learnt_shrunk
-        rows = [names.index(name) for name in ("c", "tan_phi", "k")]
-        beside = np.round(shrunk * self.beside[rows], TUNING.explain.learnt_places - 1)
-        among = np.round(
-            shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], TUNING.explain.learnt_places - 1
-        )
+        names, places = self._unknowns.soil_names, TUNING.explain.learnt_places - 1
+        rows, shrunk = [names.index(n) for n in ("c", "tan_phi", "k")], 1.0 - 10.0**-places
+        beside = np.round(shrunk * self.beside[rows], places)
+        among = np.round(shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], places)
 
         cohesion, tan_phi, shear_modulus = (tuple(row) for row in beside.tolist())
         three = float(among[0, 1]), float(among[0, 2]), float(among[1, 2])

@@ -237,7 +237,7 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
     constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
     for constant, u, taken in constants:
         channel, kind = constant.channel, constant.kind
-        if kind in STRAINED and abs(u) > TUNING.explain.doubtful_constant:
+        if kind in STRAINED and abs(u) > TUNING.explain.doubtful:
             words = wording.strain(channel, kind, constant.of(u), constant.unit, u)
             p, share = float(2.0 * ndtr(-abs(u))), taken / float(nats.sum())
             places.append(Place(taken, Location(channel, "constant", share, p, p, words)))

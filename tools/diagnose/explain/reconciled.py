@@ -16,13 +16,13 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 
 def reconciled(mean: float, sigma: float) -> tuple[float, float]:
     """Mean and σ in units of the prior σ, about the prior's mean, from those of a Gaussian fit."""
     told = 1.0 / sigma**2 - 1.0 if sigma > 0.0 else np.inf  # by the recordings: precision
-    least = TUNING.explain.told_least
-    if not least < told < least**-2:
+    if not SLIGHT < told < 1.0 / SLIGHT:
         return mean, sigma
     value, own = mean * (1.0 + told) / told, told**-0.5
 

@@ -33,7 +33,7 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
     for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
         squares = float(np.mean(left[stack.of(channel)] ** 2)) - colour.sigma**2
         size = float(np.sqrt(max(squares, 0.0)))
-        near = size <= TUNING.explain.remainder_noise * colour.sigma
+        near = size <= colour.sigma
         functions = [s for s in every if s.shape.channel == channel]
         where = WITHIN if near else _where(stack, channel, functions, left)
         told[channel] = Remainder(size, rig.units[channel], where)

@@ -82,7 +82,7 @@ def _order(effect: Effect) -> float | None:
 
 
 def _taken(line: SpectralLine, orders: Sequence[float]) -> bool:
-    return any(abs(line.at - order) < TUNING.orders.same * line.cell for order in orders)
+    return any(abs(line.at - order) < line.cell for order in orders)
 
 
 def _grouped(lines: Sequence[SpectralLine]) -> list[list[SpectralLine]]:
@@ -90,7 +90,7 @@ def _grouped(lines: Sequence[SpectralLine]) -> list[list[SpectralLine]]:
     groups: list[list[SpectralLine]] = []
     for line in lines:
         for group in groups:
-            if abs(line.at - group[0].at) < TUNING.orders.same * line.cell:
+            if abs(line.at - group[0].at) < line.cell:
                 group.append(line)
                 break
         else:

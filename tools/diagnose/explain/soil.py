@@ -44,9 +44,7 @@ def averaged_soil(problem: Problem, decision: Decision) -> dict[str, Quantity]:
     """
     rig = problem.stack.rig
     every = [
-        (w.model, w.probability)
-        for w in decision.weighed
-        if w.probability > TUNING.explain.slight_explanation
+        (w.model, w.probability) for w in decision.weighed if w.probability > TUNING.screen.level
     ]
 
     told = [(_soil_of(problem, model), share) for model, share in every or [(decision.best, 1.0)]]

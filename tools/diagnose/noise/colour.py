@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import solve_banded
 
 from gritd.estimator.compiled import whitening
 from gritd.estimator.terramechanics.soil import Array
@@ -101,7 +100,7 @@ def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> s
     """
     kept, gain, scale = (np.squeeze(p, -1) for p in _recursion(gaps, [colour], beside))
     kept, gain = kept[..., 0], gain[..., 0]
-    forgotten = TUNING.noise.forgotten * TUNING.noise.negligible * scale.min(initial=1.0)
+    forgotten = TUNING.noise.negligible * scale.min(initial=1.0)
 
     slow, fast = np.zeros(gaps.size), np.zeros(gaps.size)
     values, rows, columns = [], [], []
@@ -251,19 +250,6 @@ def whiten_rows(noise: Noise, columns: Array, rows: Bools) -> Array:
     return np.asarray(noise.whitener[rows][:, rows] @ columns)
 
 
-def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:
-    """Noise of a colour (n, count), in the unit of its σ; gaps (n,) between the values [s]."""
-    white = 1.0 - colour.slow - colour.fast
-    out = np.sqrt(white) * rng.standard_normal((len(gaps), count))
-    for share, time in (
-        (colour.slow, colour.time),
-        (colour.fast, TUNING.noise.fast_time * step_of(gaps)),
-    ):
-        if share > 0.0:
-            out += np.sqrt(share) * _relaxing(gaps, count, time, rng)
-    return np.asarray(colour.sigma * out)
-
-
 def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     """Of noise of a colour (n, n) at times (n,)."""
     apart = np.abs(time[:, None] - time[None, :])
@@ -273,28 +259,3 @@ def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     )
     white = (1.0 - colour.slow - colour.fast) * np.eye(len(time))
     return np.asarray(colour.sigma**2 * (white + colour.slow * slow + colour.fast * fast))
-
-
-def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
-    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then where it
-    is used.
-    """
-    step = step_of(gaps)
-    apart = TUNING.noise.apart * (
-        1 + round(time / step)
-    )  # grid places between runs: enough to forget
-    place = np.cumsum(
-        np.maximum(np.rint(np.where(np.isfinite(gaps), gaps / step, apart)), 1.0)
-    ).astype(int)
-
-    kept = float(np.exp(-step / time))
-    kicks = rng.standard_normal((int(place[-1]) + 1, count)) * np.sqrt(1.0 - kept**2)
-    return np.asarray(_filtered(kicks, kept)[place])
-
-
-def _filtered(kicks: Array, kept: float) -> Array:
-    """y (n, count) of yᵢ = kicksᵢ + kept · yᵢ₋₁. As scipy.signal's lfilter, which takes a second to
-    load.
-    """
-    bands = np.stack((np.ones(len(kicks)), np.full(len(kicks), -kept)))
-    return np.asarray(solve_banded((1, 0), bands, kicks, check_finite=False))

@@ -27,7 +27,7 @@ from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SIZE, SQUARE
+from gritd.tools.diagnose.tuning.guards import RIDGE, SIZE, SQUARE
 
 
 def spikes(
@@ -150,7 +150,7 @@ def calmer(
     than they are found to. A difference of two torques is no quieter than the motor's alone.
     """
     stack = noise.stack
-    if np.count_nonzero(idle) < TUNING.noise.idle_values:
+    if np.count_nonzero(idle) < TUNING.noise.cell_values:
         return noise
     step = step_of(stack.gaps)
     sized, weight = _posterior(stack, "torque", residual, explainable, cells, before, idle)
@@ -309,13 +309,12 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
         so many values.
     """
     inner, size = gram[:, :-1, :-1], gram.shape[1] - 1
-    inner = inner + TUNING.noise.ridge * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
-        size, 1
-    ) * np.eye(size)
+    scale = np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(size, 1)
+    inner = inner + RIDGE * scale * np.eye(size)
 
     root = np.linalg.cholesky(inner)
     taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
-    free = max(count - size, TUNING.noise.least_freedom)
+    free = max(count - size, 1)
 
     variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), SQUARE) / free
     spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)

@@ -83,7 +83,7 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     span = longest if axis == "time" else float(np.ptp(x[np.concatenate(parts)]))
     every = np.arange(TUNING.noise.most_frequencies) / (TUNING.noise.line_density * span)
     tried = TUNING.orders.cycles / longest + every
-    return np.asarray(tried[tried * interval < TUNING.noise.line_nyquist])
+    return np.asarray(tried[tried * interval < TUNING.orders.nyquist])
 
 
 def waves(x: Array, frequency: Array) -> Array:

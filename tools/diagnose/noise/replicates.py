@@ -25,15 +25,14 @@ from gritd.tools.diagnose.noise.colour import Colour, covariance
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SPAN
+from gritd.tools.diagnose.tuning.guards import SPAN, WAY
 
 
 def cells(stack: Stack) -> Index:
     """Number of the cell of each value (N,); −1 where the wheel rests or little was held."""
-    for coarser in TUNING.noise.coarser_cells:
-        label = _labels(stack, coarser)
-        if label.max(initial=-1) < TUNING.noise.most_cells:
-            break
+    coarser = 1.0
+    while (label := _labels(stack, coarser)).max(initial=-1) >= TUNING.noise.most_cells:
+        coarser *= 2.0
     return label
 
 
@@ -177,7 +176,7 @@ def _one_condition(own: Bools, label: Index) -> bool:
     meanwhile.
     """
     most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
-    return bool(most >= max(TUNING.noise.drift_values, TUNING.noise.whole_run * int(own.sum())))
+    return bool(most >= max(TUNING.noise.drift_values, TUNING.noise.mostly * int(own.sum())))
 
 
 def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCondition | None:
@@ -187,7 +186,7 @@ def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCo
         for two in held
         if two.run > one.run
         and np.abs(two.condition - one.condition).max() <= 1.0
-        and np.abs(terms[two.run] - terms[one.run]).max() <= TUNING.noise.equal_runs
+        and np.abs(terms[two.run] - terms[one.run]).max() <= WAY
     ]
 
     return min(
@@ -204,7 +203,7 @@ def _shapes(time: Array, waves: Array) -> Array:
     along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), SPAN) - 1.0
     drifts = legendre.legvander(along, TUNING.noise.drift_shapes - 1)
     left = waves - drifts @ np.linalg.lstsq(drifts, waves, rcond=None)[0]
-    kept = np.sum(left**2, axis=0) > TUNING.noise.mostly_wave * np.sum(waves**2, axis=0)
+    kept = np.sum(left**2, axis=0) > TUNING.noise.mostly * np.sum(waves**2, axis=0)
     return np.column_stack((drifts, np.where(kept, left, 0.0)))
 
 
@@ -222,7 +221,7 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
         known = np.isfinite(difference)
         squares, chance = difference[known] ** 2, chance[known]
         if squares.size >= TUNING.noise.least_pairs:
-            rare = chdtrc(squares.size, float(np.sum(squares / chance))) < TUNING.noise.drift_chance
+            rare = chdtrc(squares.size, float(np.sum(squares / chance))) < TUNING.screen.level
             if order == 0 or rare:
                 out[order] = np.sqrt(
                     _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)
@@ -233,7 +232,7 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
 
 def _few(count: int) -> float:
     """Variance of Student's t: a variance known from few differences must be taken larger."""
-    return max(count, TUNING.noise.fewest_pairs) / (max(count, TUNING.noise.fewest_pairs) - 2.0)
+    return (count + 2.0) / count
 
 
 def _terms(stack: Stack) -> Array:

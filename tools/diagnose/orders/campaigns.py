@@ -54,8 +54,7 @@ class Lines:
         return [x for x in own if self.before(x) <= TUNING.orders.known * x.size]
 
     def _configured(self, line: SpectralLine) -> bool:
-        near = TUNING.orders.same * line.cell
-        return line.axis == "angle" and any(abs(line.at - n) < near for n in self.configured)
+        return line.axis == "angle" and any(abs(line.at - n) < line.cell for n in self.configured)
 
     def before(self, line: SpectralLine) -> float:
         """Size of a line in the reference. One of few turns may stand there without being found
@@ -99,6 +98,6 @@ def same(one: SpectralLine, other: SpectralLine) -> bool:
 
 
 def _near(one: SpectralLine, other: SpectralLine) -> bool:
-    apart = TUNING.orders.same * max(one.cell, other.cell)
+    apart = max(one.cell, other.cell)
     doubt = TUNING.orders.apart_sigma * float(np.hypot(one.sigma, other.sigma))
     return abs(one.at - other.at) < max(apart, doubt)

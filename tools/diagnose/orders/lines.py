@@ -131,7 +131,7 @@ class _Channel:
     def support(self, axis: str, at: float) -> float:
         """Evidence [nats] of a line and its next harmonics in the readings as they were."""
         times = np.arange(1, TUNING.orders.supporting + 1)
-        near = [self._nearest(self._first[axis], axis, float(k * at)) for k in times]
+        near = [self._near(self._first[axis], axis, float(k * at)).min(initial=0.0) for k in times]
         return float(np.sum(np.maximum(-np.array(near) - TUNING.orders.supports, 0.0)))
 
     def cleaned(self, axis: str, place: int) -> float:
@@ -154,20 +154,21 @@ class _Channel:
         return self._cleaned[axis]
 
     def near(self, axis: str, at: float) -> float:
-        """Log chance of a line at this place or its neighbours in the grid."""
-        return self._nearest(self.chances[axis], axis, at)
+        """Log chance of a line at this place or its neighbours in the grid, all of them counted."""
+        near = self._near(self.chances[axis], axis, at)
+        return float(near.min(initial=0.0) + np.log(max(near.size, 1)))
 
-    def _nearest(self, chances: Array, axis: str, at: float) -> float:
+    def _near(self, chances: Array, axis: str, at: float) -> Array:
         place = round(at / self.places[axis].spacing)
-        return float(chances[max(place - 1, 0) : place + 2].min(initial=0.0))
+        return chances[max(place - 1, 0) : place + 2]
 
     def refined(self, axis: str, place: int) -> float:
         """The likeliest place between its neighbours in the grid."""
         at, step = place * self.places[axis].spacing, self.places[axis].spacing
         for _ in range(TUNING.orders.refinements):
-            tried = at + step * np.linspace(-1.0, 1.0, TUNING.orders.refined_places)
+            tried = at + step * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
             at = float(tried[int(np.argmax(self._gain(axis, place, tried)))])
-            step *= 2.0 / (TUNING.orders.refined_places - 1)
+            step *= 0.5
         return at
 
     def _gain(self, axis: str, place: int, tried: Array) -> Array:
@@ -268,8 +269,10 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
         at = first.refined(axis, place)
         support = sum(channel.support(axis, at) for channel in channels)
         for channel in (first, *(c for c in channels if c is not first)):
-            tries = tried if channel is first else TUNING.orders.near_places * len(channels)
-            log_p = (chance if channel is first else channel.near(axis, at)) + np.log(tries)
+            if channel is first:
+                log_p = chance + np.log(tried)
+            else:
+                log_p = channel.near(axis, at) + np.log(len(channels))
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
                 lines += [] if _rest(line, lines) else [line, *_overtones(channel, line, len(runs))]
@@ -296,7 +299,7 @@ def _overtones(channel: _Channel, line: SpectralLine, runs: int) -> Iterator[Spe
     """Harmonics of a line, which few places need be tried for."""
     times = range(2, TUNING.orders.harmonics + 1)
     for at in (k * line.at for k in times):
-        log_p = channel.near(line.axis, at) + np.log(TUNING.orders.near_places * len(times))
+        log_p = channel.near(line.axis, at) + np.log(len(times))
         if log_p <= np.log(TUNING.orders.level):
             at = channel.refined(line.axis, round(at / channel.places[line.axis].spacing))
             yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
@@ -373,9 +376,7 @@ def _with_harmonics(
 def _base(line: SpectralLine, louder: Sequence[SpectralLine]) -> float:
     for other in louder:
         times = round(line.at / other.at)
-        if (
-            2 <= times <= TUNING.orders.harmonics
-            and abs(line.at - times * other.at) < TUNING.orders.same * line.cell
-        ):
+        near = abs(line.at - times * other.at) < line.cell
+        if near and 2 <= times <= TUNING.orders.harmonics:
             return other.at
     return 0.0

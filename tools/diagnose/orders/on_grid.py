@@ -55,7 +55,7 @@ def on_grid(
 def beyond(line: SpectralLine, grid: Array) -> bool:
     """Whether a line is faster than a grid of these times (g,) [s] holds."""
     rate = 1.0 / float(np.median(np.diff(grid)))
-    return line.frequency[1] > TUNING.fit.order_nyquist * rate
+    return line.frequency[1] > TUNING.orders.nyquist * rate
 
 
 def _weights(
@@ -85,9 +85,7 @@ def _nearest(time: Array, begins: Array, ends: Array, motion: GridMotion) -> Int
     between = 0.5 * (ends[:-1] + begins[1:])
     number = np.searchsorted(between, time)
     speed = np.abs(np.nan_to_num(motion.wheel_speed))
-    driving = np.interp(time, motion.time, speed) > TUNING.orders.creep * np.median(
-        speed[speed > 0]
-    )
+    driving = np.interp(time, motion.time, speed) > TUNING.rig.creep * np.median(speed[speed > 0])
     return np.where(driving, number, -1).astype(np.int64)
 
 

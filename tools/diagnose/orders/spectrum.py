@@ -116,7 +116,8 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
 
     together = 4.0 / (1.0 / np.maximum(few, SQUARE) + 1.0 / np.maximum(many, SQUARE))
     level = np.exp(0.5 * (below + above) + np.euler_gamma)
-    freedom = np.maximum(2.0 * TUNING.orders.geometric * together, 1.0)
+    # freedom of a geometric mean of exponential values: 6/π² of that of their mean
+    freedom = np.maximum(12.0 / np.pi**2 * together, 1.0)
     return np.where(known, level, np.inf), freedom
 
 

@@ -144,13 +144,13 @@ def _steady(motion: GridMotion) -> NDArray[np.bool_]:
     moving = np.abs(speed[known & (np.abs(speed) > 0.0)])
     usual = float(np.median(moving)) if moving.size else np.inf
 
-    driving = known & (np.abs(speed) > TUNING.orders.creep * usual)
+    driving = known & (np.abs(speed) > TUNING.rig.creep * usual)
     way = np.where(driving, np.sign(np.nan_to_num(speed)), 0.0)
     turned = np.diff(way, prepend=way[:1]) != 0.0
     ramp = _changes(speed, step) | _changes(motion.carriage_speed, step)
     if motion.load is not None:
         ramp |= _changes(_without_pulses(motion.load, step), step)
-    settling = round(TUNING.orders.settled / step)
+    settling = round(TUNING.rig.settling / step)
     return driving & ~_widened(turned, settling) & ~ramp
 
 

@@ -34,7 +34,7 @@ def rig_of(
         raise CommandError(
             "--reference: found a drive without soil; expected a wheel's recordings", USAGE
         )
-    return _drive_rig(recordings, settings), TUNING.rig.drive_rate
+    return _drive_rig(recordings, settings), TUNING.rig.rate
 
 
 def _drive_rig(recordings: Sequence[Recording], settings: Settings) -> Rig:
@@ -50,7 +50,7 @@ def _wheel_rig(
     recordings: Sequence[Recording], settings: Settings, reference: Sequence[Recording], bed: Bed
 ) -> tuple[Rig, float]:
     coarse = [
-        [signals(r, settings, TUNING.rig.first_rate) for r in each]
+        [signals(r, settings, TUNING.rig.rates[-1][1]) for r in each]
         for each in (reference, recordings)
     ]
     length = sum(float(s.time[-1]) for each in coarse for s in each)

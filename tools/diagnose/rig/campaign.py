@@ -69,7 +69,7 @@ class Campaign:
         bearing = tuple(effect for effect in effects if effect.bears_on_soil())
         key = (soil, weights.tobytes(), travelled, bearing)
         if key not in self._carried:
-            if len(self._carried) >= TUNING.rig.kept_balances:
+            if len(self._carried) >= TUNING.rig.kept:
                 self._carried.pop(next(iter(self._carried)))
             motion = _scaled(self._joined, weights, travelled)
             self._carried[key] = self._balanced(soil, motion, bearing, self._last)

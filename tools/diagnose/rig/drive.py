@@ -62,7 +62,7 @@ def drive_rig(
     motions = [_motion(s, constant, n) for s, n in zip(series, names, strict=True)]
     unit = _size(m.torque for m in motions) / TUNING.rig.usual_torque
     speed = np.abs(np.concatenate([m.velocity for m in motions]))
-    usual = float(np.median(speed[speed > TUNING.rig.moving * speed.max()]))
+    usual = float(np.median(speed[speed > TUNING.rig.creep * speed.max()]))
 
     model = DriveModel(motions, _constants(motions, unit), unit, usual)
     return Rig(
@@ -147,7 +147,7 @@ def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
     velocity, torque, angle = (
         motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
     )
-    still = TUNING.rig.still * usual
+    still = TUNING.rig.creep * usual
     fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
 
     covariates = {
@@ -189,7 +189,7 @@ class DriveMotion:
     @property
     def every(self) -> int:
         """Fine intervals in one of the comparison."""
-        return max(round(1.0 / (TUNING.rig.drive_rate * self.step)), 1)
+        return max(round(1.0 / (TUNING.rig.rate * self.step)), 1)
 
     @property
     def kept(self) -> slice:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gritd.estimator.model.discrepancy import Usual, conditions_of, weight_of
+from gritd.estimator.model.discrepancy import CARRYING, Usual, conditions_of, weight_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import FormSource, GridRun
-from gritd.tools.diagnose.tuning import TUNING
 
 SOURCES = (  # name, channels that share one discrepancy, whether it turns with the direction
     ("torque", ("torque", "axle_torque"), True),
@@ -62,7 +61,7 @@ def usual_of(runs: Sequence[GridRun]) -> Usual | None:
     driving = (speed > 0.0) & (load > 0.0)
     if not driving.any():
         return None
-    driving &= load > TUNING.rig.carrying * np.median(load[driving])
+    driving &= load > CARRYING * np.median(load[driving])
     return Usual(
         float(np.exp(np.mean(np.log(load[driving])))),
         float(np.exp(np.mean(np.log(speed[driving])))),
@@ -81,4 +80,4 @@ def _weight(run: GridRun, usual: Usual, signed: bool) -> Array:
     """How large δ is at each value (n,): in proportion to the load, 0 where no soil is touched."""
     known = run.covariates
     direction = np.where(known["direction"] < 0.0, -1.0, 1.0)
-    return weight_of(known["load"], known["speed"], direction, usual, signed, TUNING.rig.carrying)
+    return weight_of(known["load"], known["speed"], direction, usual, signed, CARRYING)

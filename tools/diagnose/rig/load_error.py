@@ -75,7 +75,7 @@ def error_of_level(load: Array) -> float:
 
 def _level(load: Array) -> float:
     """Median while the wheel carries."""
-    return float(np.median(load[load > TUNING.rig.raised * load.max()]))
+    return float(np.median(load[load > TUNING.rig.lifted * load.max()]))
 
 
 def _moved(by_load: Channels, part: Array | float) -> dict[str, Array]:

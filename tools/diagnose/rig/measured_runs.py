@@ -112,7 +112,7 @@ def torque_is_held(runs: Sequence[GridRun]) -> bool:
     if len(means) < 2 or not driven.size:
         return False
     usual = float(np.sqrt(np.mean(driven**2)))
-    least = max(TUNING.rig.holding * usual, TUNING.rig.holding_errors * noise)
+    least = max(TUNING.rig.holding * usual, TUNING.rig.doubt * noise)
     return float(np.ptp(means)) >= least
 
 

@@ -59,5 +59,5 @@ def _by(predict: Predict, constants: Sequence[Constant], name: str) -> list[dict
 
 def _relative_noise(weights: Weights) -> Array:
     """Of measured weights (n,); nothing where the wheel is lifted."""
-    carried = weights.values > TUNING.rig.raised * weights.values.max()
+    carried = weights.values > TUNING.rig.lifted * weights.values.max()
     return np.where(carried, weights.sigma / np.where(carried, weights.values, 1.0), 0.0)

@@ -162,7 +162,7 @@ class Prediction:
         physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
 
         if physics not in self._true_readings:
-            if len(self._true_readings) >= TUNING.rig.kept_simulations:
+            if len(self._true_readings) >= TUNING.rig.kept:
                 self._true_readings.pop(next(iter(self._true_readings)))
             weights = 1.0 + value["weights"] + np.array(own)[self._driven.set_of(new)]
             self._true_readings[physics] = campaign.readings(

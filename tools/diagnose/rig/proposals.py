@@ -45,10 +45,7 @@ MENU = Menu(
 def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     """The motion of one experiment: its levels in turn, each for an equal time."""
     speeds, slips, loads = TUNING.rig.proposal_levels[key]
-    time = (
-        np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
-        / TUNING.rig.proposal_rate
-    )
+    time = np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.rate)) / TUNING.rig.rate
 
     middle_speed, middle_load = (
         _middle([np.abs(m.wheel_speed) for m in driven]),
@@ -62,9 +59,9 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
 
     return Motion(
         time=time,
-        wheel_angle=np.cumsum(speed) / TUNING.rig.proposal_rate,
+        wheel_angle=np.cumsum(speed) / TUNING.rig.rate,
         wheel_speed=speed,
-        carriage_position=np.cumsum(travel) / TUNING.rig.proposal_rate,
+        carriage_position=np.cumsum(travel) / TUNING.rig.rate,
         carriage_speed=travel,
         load=middle_load * _stepped(loads, time),
         pass_number=last + 1.0 if key == "second_pass" else last,
@@ -77,17 +74,14 @@ def driving(key: str) -> NDArray[np.bool_]:
     something.
     """
     speeds, _, loads = TUNING.rig.proposal_levels[key]
-    time = (
-        np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
-        / TUNING.rig.proposal_rate
-    )
+    time = np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.rate)) / TUNING.rig.rate
     driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)
     return driving
 
 
 def _middle(values: Sequence[Array | float]) -> float:
     joined = np.concatenate([np.atleast_1d(v) for v in values])
-    moving = joined[joined > TUNING.rig.moving * joined.max()] if joined.max() > 0.0 else joined
+    moving = joined[joined > TUNING.rig.creep * joined.max()] if joined.max() > 0.0 else joined
     return float(np.median(moving))
 
 

@@ -15,7 +15,7 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SLIGHT
+from gritd.tools.diagnose.tuning.guards import SLIGHT, SPEED
 
 
 def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
@@ -39,7 +39,7 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
             TUNING.rig.longest_settling,
         )
     )
-    apart = round(passing / step), round(TUNING.rig.stopping / step)
+    apart = round(passing / step), round(TUNING.rig.settling / step)
 
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
     driving, spinning = (_inside(np.where(state, way, 0.0), *apart) for state in (carrying, lifted))
@@ -71,9 +71,7 @@ def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     nothing.
     """
     turning = np.abs(rim_speed)[np.abs(rim_speed) > TUNING.rig.turning_speed]
-    least = (
-        TUNING.rig.rest_speed * float(np.median(turning)) if turning.size else TUNING.rig.standing
-    )
+    least = TUNING.rig.rest_speed * float(np.median(turning)) if turning.size else SPEED
     rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
     return rest
 

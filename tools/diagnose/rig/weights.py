@@ -57,11 +57,11 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
     load = measured.load
     near, lifted = (
         np.abs(load - stated) <= TUNING.rig.close_load * stated + TUNING.rig.close_force,
-        load <= TUNING.rig.raised * stated,
+        load <= TUNING.rig.lifted * stated,
     )
 
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
-    known = nominal is not None or abs(held - stated) <= TUNING.rig.load_doubt * _sigma(
+    known = nominal is not None or abs(held - stated) <= TUNING.rig.doubt * _sigma(
         settings.load.nominal, settings.wrench.load
     )
     if (
@@ -69,7 +69,7 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
         and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
         and np.mean(near) > np.mean(lifted)
     ):
-        hung = np.where(load > TUNING.rig.carried * stated, constant, 0.0)
+        hung = np.where(load > 0.5 * stated, constant, 0.0)
         return Weights(hung, hung, True)
 
     return measured
@@ -84,7 +84,7 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
         return None
     if wrench.load.offset.sigma > TUNING.rig.unknown_offset:
         return None
-    if np.mean(np.isfinite(measured)) < TUNING.rig.load_known:
+    if np.mean(np.isfinite(measured)) < 0.5:
         return None
 
     load = _bridged(measured)

@@ -15,18 +15,12 @@ class Explain:
     beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
 
     # --- doubts.py, result.py ---
-    loud: float = tuned(
-        3.0,
-        "times",
-        "the stated noise of a reading: a grid value is a mean of readings",
-        "judgement",
-    )
-    doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is reported")
+    doubtful: float = tuned(3.0, "σ", "from what is known, or times the stated noise: reported")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is reported")
 
     # --- summary.py ---
     held_out_worse: float = tuned(
-        0.1, "share", "by which the held-out error of a channel grows: an explanation in part"
+        0.1, "share", "that a held-out error grows by, or a law leaves: an explanation in part"
     )
 
     # --- experiment.py ---
@@ -36,15 +30,10 @@ class Explain:
     foreseen_error: float = tuned(
         0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
     )
-    foreseen_together: int = tuned(10, "values", "that count as one: neighbours share their noise")
-    rivals: int = tuned(4, "explanations", "that an experiment is to distinguish", "run time")
 
     # --- explanation.py ---
     shown: int = tuned(4, "lines, runs, or scatters", "that are shown of many")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
-    slight_explanation: float = tuned(
-        1e-2, "probability", "below which an explanation does not count for the soil"
-    )
 
     # --- reconciled.py ---
     stated_wrong: float = tuned(
@@ -54,13 +43,9 @@ class Explain:
     told_freedom: float = tuned(
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
     )
-    told_least: float = tuned(1e-4, "-", "precision in the prior's: less says nothing of the soil")
     summed_steps: int = tuned(801, "points", "about each of the two", "run time")
 
     # --- law.py ---
-    law_carries: float = tuned(
-        0.9, "share", "of the misfit that a law must take to be written in place of δ"
-    )
 
     # --- locate.py ---
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
@@ -69,7 +54,6 @@ class Explain:
     same_wheel: float = tuned(0.1, "-", "of radius and width: more is another wheel, no correction")
 
     # --- remainder.py ---
-    remainder_noise: float = tuned(0.5, "σ", "of the noise: a smaller remainder is within it")
 
     # --- traces.py ---
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
@@ -87,7 +71,6 @@ class Explain:
         1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
     )
     learnt_ridge: float = tuned(1e-4, "-", "of the features' squares, against rounding")
-    learnt_shrunk: float = tuned(0.999, "-", "factor on correlations that are rounded", "rounding")
     learnt_beyond: float = tuned(
         0.005, "quantile", "of slip, load and speed that may lie beyond either end of the domain"
     )

@@ -6,6 +6,7 @@ follows their value.
 
 SPAN = 1e-9  # of a length of time [s], a way [m], an angle [rad], a load [N], a share, or nats
 SQUARE = 1e-300  # of a sum of squares or a variance: just above what a float can hold
+RIDGE = 1e-9  # of the mean square of normal equations: above their rounding
 SIZE = 1e-12  # of a value's size, in the value's unit
 SLIGHT = 1e-6  # of an angle [rad], a turning speed [rad/s], or a noise in that of its channel
 SPEED = 1e-4  # of a wheel's rim that drives [m/s]

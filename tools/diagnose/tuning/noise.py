@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from gritd.tools.diagnose.tuning.field import tuned
 
 SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95, 0.99)
-DAMPED = "damping of a mean over an interval"
 CELLS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
 
 
@@ -33,11 +32,7 @@ class NoiseTuning:
     negligible: float = tuned(
         1e-5, "-", "weight of a value long past in an innovation: it is left out", "run time"
     )
-    forgotten: float = tuned(
-        0.01, "of what is negligible", "a state that no later innovation shows", "run time"
-    )
     whitened_at_once: int = tuned(4_000_000, "numbers", "whitened at once", "memory")
-    apart: int = tuned(5, "correlation times", "between runs of a surrogate: enough to forget")
 
     # --- estimate.py ---
     slow_times: tuple[float, ...] = tuned(
@@ -49,8 +44,6 @@ class NoiseTuning:
     fast_shares: tuple[float, ...] = tuned(
         (0.0, 0.4, 0.9), "share", "of the rest that the fast part takes, as tried"
     )
-    ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
-    least_freedom: int = tuned(3, "values", "beside the mean's columns that tell a size, at least")
     steady: float = tuned(
         1.3, "-", "values that blur makes noisier than so many of their channel's σ say nothing"
     )
@@ -72,7 +65,6 @@ class NoiseTuning:
     )
     restless_values: int = tuned(41, "values", "whose median tells how the differences are there")
     restless_least: float = tuned(0.05, "share", "of the noise that differs from value to value")
-    idle_values: int = tuned(20, "values", "of an idle motor that tell its noise, at least")
     calmest: float = tuned(
         0.02, "-", "times the noise of what the drive loses: that of an idle motor, at least"
     )
@@ -85,7 +77,6 @@ class NoiseTuning:
     line_density: float = tuned(
         2.0, "-", "frequencies tried in each that the longest stretch resolves"
     )
-    line_nyquist: float = tuned(0.35, "-", "of the grid's rate: faster waves are damped", DAMPED)
     most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
     long_waves: int = tuned(6, "waves", "of the bed that are too long to have neighbours, at most")
 
@@ -93,25 +84,18 @@ class NoiseTuning:
     cell_widths: Mapping[str, float] = tuned(
         CELLS, "-", "of a cell of equal conditions; of speed and load relative to their largest"
     )
-    coarser_cells: tuple[float, ...] = tuned(
-        (1.0, 2.0, 4.0), "choice", "factors on the widths, tried until cells are few enough"
-    )
     cell_values: int = tuned(10, "values", "a cell must hold")
     most_cells: int = tuned(60, "cells", "of a channel, at most")
     cell_phases: tuple[float, ...] = tuned(
         (0.5, 0.75, 0.0, 0.25), "choice", "of the edges of cells, in their widths"
     )
-    equal_runs: float = tuned(
-        1e-3, "-", "difference of pass or start from which two runs are no replicates"
-    )
     least_pairs: int = tuned(2, "comparisons", "of replicates at least")
-    fewest_pairs: int = tuned(4, "comparisons", "fewer count as so many")
     drift_shapes: int = tuned(4, "shapes", "of what a run does: a mean and three of drift")
     drift_values: int = tuned(40, "values", "that drifts need")
-    whole_run: float = tuned(0.9, "share", "of a run in one cell, by which it held one condition")
-    mostly_wave: float = tuned(0.8, "share", "of a wave's squares that no drift could be")
-    drift_chance: float = tuned(
-        0.01, "probability", "by which noise alone may make drifts differ as they do"
+    mostly: float = tuned(
+        0.9,
+        "share",
+        "of a run in one cell: it held one condition; of a wave that is no drift",
     )
 
     # --- saturated.py ---

@@ -14,8 +14,6 @@ class Orders:
     """What counts as a line in a spectrum against the wheel angle."""
 
     # --- stretches.py ---
-    creep: float = tuned(0.05, "-", "of the usual speed: a slower wheel does not drive")
-    settled: float = tuned(0.5, "s", "after a start and before a stop nothing is steady")
     changed: float = tuned(0.02, "-", "relative change of a speed or load within `apart`: a ramp")
     apart: float = tuned(0.3, "s", "over which a change of speed or load is looked for")
     change_noise: float = tuned(5.0, "σ", "of their own noise: less is no ramp")
@@ -37,7 +35,6 @@ class Orders:
     near: float = tuned(1.5, "cells", "nearer in the spectrum is the line itself")
     far: float = tuned(8.0, "cells", "as far the spectrum of the noise is smooth", NEIGHBOURS)
     least_neighbours: float = tuned(3.0, "cells", "on either side, or nothing is known")
-    geometric: float = tuned(0.61, "-", "freedom of a geometric mean of exponential values", "6/π²")
 
     # --- lines.py ---
     level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
@@ -46,18 +43,15 @@ class Orders:
     rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
     sweeps: int = tuned(3, "times", "all lines of a channel are estimated anew beside another")
-    refinements: int = tuned(4, "times", "a line's place is looked for more finely")
-    refined_places: int = tuned(9, "places", "of each such look")
+    refinements: int = tuned(8, "times", "a line's place is looked for more finely")
     prefer_angle: float = tuned(
         3.0, "nats", "at one speed a ripple of the wheel is also one in time: the wheel's is meant"
     )
-    same: float = tuned(1.0, "cells", "closer lines of two channels are one")
     supporting: int = tuned(3, "times", "an order, whose evidence supports it as a count")
     supports: float = tuned(2.0, "nats", "of each: less is chance, three places are tried in each")
     behind: float = tuned(10.0, "nats", "of support: orders so far behind the best are no count")
     apart_sigma: float = tuned(4.0, "σ", "of their places: closer lines are one")
     known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")
-    near_places: float = tuned(3.0, "places", "that are tried about a known one")
     harmonics: int = tuned(6, "times", "the order of a louder line: its harmonic")
 
     # --- phases.py ---

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gritd.estimator.model.discrepancy import CARRYING
 from gritd.tools.diagnose.tuning.field import tuned
 
 DESIGN = "order of magnitude of common instruments"
@@ -34,13 +33,12 @@ class RigTuning:
     rates: tuple[tuple[float, float], ...] = tuned(
         RATES, "choice", "[s, Hz] grid of runs that are together up to so long", "run time"
     )
-    first_rate: float = tuned(1.0, "Hz", "grid on which the length of the recordings is found")
 
     # --- campaign.py ---
     quadrature_order: int = tuned(
         6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
     )
-    kept_balances: int = tuned(8, "balances", "of all runs that are kept", "memory, run time")
+    kept: int = tuned(8, "simulations", "of all runs that are kept", "memory, run time")
 
     # --- constants.py ---
     timing: float = tuned(5e-3, "s", "a channel's stamps may be off by so much", DESIGN)
@@ -61,7 +59,6 @@ class RigTuning:
     )
 
     # --- drive.py ---
-    drive_rate: float = tuned(10.0, "Hz", "grid of the comparison, as for a wheel")
     fine_rate: float = tuned(
         250.0, "Hz", "at most: position and current are averaged on it, the model evaluated"
     )
@@ -76,17 +73,11 @@ class RigTuning:
     usual_torque: float = tuned(
         2.0, "unit", "size of a drive's torque: that of the wheel the priors were made for"
     )
-    still: float = tuned(
-        0.05, "-", "of the usual speed: below it a drive rests, friction holds what is asked"
-    )
     unknown_drive: float = tuned(
         10.0, "-", "sigma of a constant not known, in what would take all of the torque"
     )
 
     # --- form.py ---
-    carrying: float = tuned(
-        CARRYING, "-", "of the usual load: below it the wheel hardly touches soil"
-    )
 
     # --- load_error.py ---
     other_weights: float = tuned(
@@ -99,7 +90,6 @@ class RigTuning:
     proposal_levels: Mapping[str, Levels] = tuned(
         LEVELS, "choice", "what each experiment of the menu drives, one after the other"
     )
-    proposal_rate: float = tuned(10.0, "Hz", "grid of a foreseen experiment")
 
     # --- signals.py ---
     longest: float = tuned(
@@ -110,22 +100,17 @@ class RigTuning:
     grid_values: int = tuned(5, "values", "of a recording on its grid at least")
 
     # --- states.py, drive.py, proposals.py ---
-    moving: float = tuned(0.05, "-", "of the largest value: below it a speed or load is at rest")
-    creep: float = tuned(0.05, "-", "of the usual rim speed: below it the wheel does not drive")
-    settling: float = tuned(0.5, "s", "after the wheel starts, at least, before values count")
+    creep: float = tuned(0.05, "-", "of the usual speed, or of the largest load: below it is rest")
+    settling: float = tuned(0.5, "s", "after a start at least, and before a stop, no value counts")
     longest_settling: float = tuned(5.0, "s", "after the wheel starts, at most")
-    stopping: float = tuned(
-        0.5, "s", "before the wheel stops values no longer count: a slope's reach, a servo's ramp"
-    )
     contact_angle: float = tuned(
         0.7, "rad", "usual entry angle: by then the rim has passed one contact and has sunk"
     )
     resting: float = tuned(0.4, "s", "the wheel must have stood for its current to be that at rest")
     rising: float = tuned(0.2, "s", "the wheel must go on standing")
     turning_speed: float = tuned(1e-3, "m/s", "a slower rim does not turn")
-    standing: float = tuned(1e-4, "m/s", "slower is rest where no rim turns")
     rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
-    lifted: float = tuned(0.2, "-", "of the least load: below it the wheel is lifted")
+    lifted: float = tuned(0.2, "-", "of the stated or least load: below it the wheel is lifted")
 
     # --- unrest.py ---
     unrest_values: int = tuned(61, "values", "whose median is the speed of a held condition")
@@ -146,15 +131,10 @@ class RigTuning:
         0.15, "-", "relative distance of measured and stated load at which both mean the same"
     )
     close_force: float = tuned(1.0, "N", "beside this: weights are not stated to less")
-    carried: float = tuned(0.5, "share", "of the stated load: above it the wheel carries it")
-    raised: float = tuned(0.2, "-", "of the stated load: below it the wheel is lifted")
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
-    load_doubt: float = tuned(
-        4.0, "σ", "of weights and sensor: beyond, a run that states nothing had other weights"
-    )
+    doubt: float = tuned(4.0, "σ", "of weights or a current at rest: beyond, they are others")
     load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
     load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
-    load_known: float = tuned(0.5, "share", "of a run's loads that must have been measured")
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
     hold: float = tuned(1.0, "s", "weights stay for at least this long")
 
@@ -166,15 +146,11 @@ class RigTuning:
     holding: float = tuned(
         0.05, "-", "of the torque that is compared: current at rest that differs by more is held"
     )
-    holding_errors: float = tuned(
-        4.0, "standard errors", "of the current at rest: less is its noise and holds nothing"
-    )
     slope_edge: int = tuned(2, "intervals", "at a run's ends a slope lacks its neighbours")
     unknown_offset: float = tuned(
         1e5, "N or N·m", "an offset less certain says that the channel was not measured"
     )
     one_load: float = tuned(0.1, "-", "relative spread below which the loads are one")
-    kept_simulations: int = tuned(8, "simulations", "of a run that are kept", "memory, run time")
     prepared: Mapping[str, float] = tuned(
         PREPARED, "-", "relative repeatability of a bed that is raked and levelled anew"
     )
@@ -188,3 +164,8 @@ class RigTuning:
     )
     shortest_relief: float = tuned(0.1, "m", "wave of such a surface: a board bridges shorter ones")
     most_reliefs: int = tuned(12, "half waves", "of such a surface along a run", "run time")
+
+    @property
+    def rate(self) -> float:
+        """[Hz] of the finest grid."""
+        return self.rates[0][1]

@@ -63,4 +63,4 @@ def _has_line(rig: Rig, effect: Effect) -> bool:
         return False
     name = order_of(type(effect))
     order = float(getattr(effect, name)) if name else 1.0
-    return any(abs(x.at - order) < TUNING.orders.same * x.cell for x in rig.lines.fresh())
+    return any(abs(x.at - order) < x.cell for x in rig.lines.fresh())

@@ -22,11 +22,12 @@ from gritd.estimator.offline.windows import block_mean, block_slope
 from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.diagnose.noise.colour import Colour, coloured
+from gritd.tools.diagnose.noise.colour import Colour
 from gritd.tools.diagnose.rig.full_rate import FullRate, beside_lines
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import Signals, doubt
 from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
+from gritd.tools.proof.ours.coloured import coloured
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import soil_of
 

@@ -21,11 +21,9 @@ from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import (
     Colour,
     Noise,
-    _filtered,
     _innovations,
     _log_det,
     _recursion,
-    coloured,
     covariance,
     products_of_innovations,
     unit_whitener,
@@ -33,6 +31,7 @@ from gritd.tools.diagnose.noise.colour import (
 from gritd.tools.diagnose.noise.estimate import restricted
 from gritd.tools.diagnose.noise.saturated import saturated_mean
 from gritd.tools.diagnose.tuning import TUNING, replaced
+from gritd.tools.proof.ours.coloured import _filtered, coloured
 
 GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
 

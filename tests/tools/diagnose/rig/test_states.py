@@ -44,7 +44,7 @@ def test_a_stop_is_left_out_before_it_and_a_start_after_it() -> None:
     driving, resting, _ = states(_motion(_levels((8, SPEED), (3, 0.0), (8, SPEED))), settings())
     before, _ = _apart(driving, 8.0)
     _, after = _apart(driving, 11.0)
-    assert before >= TUNING.rig.stopping
+    assert before >= TUNING.rig.settling
     assert after >= 0.7 / SPEED - STEP
     assert resting.any() and not (driving & resting).any()
 
@@ -53,7 +53,7 @@ def test_a_reversal_is_a_stop_and_a_start() -> None:
     """Even where no value of the grid is slow."""
     driving, _, _ = states(_motion(_levels((8, SPEED), (8, -SPEED))), settings())
     before, after = _apart(driving, 8.0)
-    assert before >= TUNING.rig.stopping and after >= TUNING.rig.stopping
+    assert before >= TUNING.rig.settling and after >= TUNING.rig.settling
 
 
 def test_a_wheel_set_down_while_it_turns_has_to_settle() -> None:
@@ -61,7 +61,7 @@ def test_a_wheel_set_down_while_it_turns_has_to_settle() -> None:
         _motion(np.full(160, SPEED), _levels((8, 0.0), (8, 70.0))), settings()
     )
     time = STEP * np.arange(160)
-    assert time[lifted].max() <= 8.0 - TUNING.rig.stopping
+    assert time[lifted].max() <= 8.0 - TUNING.rig.settling
     assert time[driving].min() >= 8.0 + 0.7 / SPEED - STEP
 
 

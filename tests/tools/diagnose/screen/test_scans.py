@@ -18,13 +18,14 @@ from gritd.tools.diagnose.explain.locate import locate
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.noise import lines
-from gritd.tools.diagnose.noise.colour import Colour, coloured
+from gritd.tools.diagnose.noise.colour import Colour
 from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.scans import candidates, without_harmonics
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, begin
 from gritd.tools.proof.ours.cases import record
+from gritd.tools.proof.ours.coloured import coloured
 from gritd.tools.proof.ours.unlisted import NextDoor, RailJointDrag
 from tests.tools.diagnose.campaigns import plan
 

@@ -327,7 +327,7 @@ class Diagnosis:
     reference: Reference | None = None  # the campaign in which nothing is new
     explanations: tuple[Explanation, ...] = ()  # all that were weighed
     lines: tuple[Ripple, ...] = ()  # at the recordings' own rate
-    latencies: tuple[()] = ()  # none is told apart from the fit: see `delay` of the nuisance
+    latencies: tuple[()] = ()  # none: the fit has the delay of each channel
     candidates: int = 0  # listed effects that were considered
     # the discrepancy of form as a configuration holds it; not in the JSON
     learnt: LearntForm | None = None

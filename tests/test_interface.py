@@ -146,7 +146,7 @@ def test_what_a_notebook_shows_of_a_value_is_one_line(simulated, recorded):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "reported"),
     [
         (lambda: gritd.simulate(schedule=[{"duration": 5.0}]), "segment 1: found duration"),
         (lambda: gritd.simulate(packaged(), []), "found no segments; expected .duration, load"),
@@ -162,7 +162,7 @@ def test_what_a_notebook_shows_of_a_value_is_one_line(simulated, recorded):
         ),
     ],
 )
-def test_a_mistake_is_one_line_that_says_what_was_expected(wrong, told):
-    with pytest.raises(ValueError, match=told) as error:
+def test_a_mistake_is_one_line_that_says_what_was_expected(wrong, reported):
+    with pytest.raises(ValueError, match=reported) as error:
         wrong()
     assert "\n" not in str(error.value)

@@ -74,7 +74,7 @@ def spreadsheet(path: Path, of: Columns) -> None:
 
 def labview(path: Path, of: Columns) -> None:
     """TDMS: waveforms without a column of time; a torque sensor at the axle; no load cell."""
-    told = {"wf_increment": EVERY / 250.0, "wf_start_time": np.datetime64(START, "ns")}
+    timing = {"wf_increment": EVERY / 250.0, "wf_start_time": np.datetime64(START, "ns")}
     channels = [
         ("Wheel speed", of["wheel"], "rad/s"),
         ("Carriage speed", of["cart"] * 1e3, "mm/s"),
@@ -83,7 +83,10 @@ def labview(path: Path, of: Columns) -> None:
     ]
     with TdmsWriter(path) as writer:
         writer.write_segment(
-            [ChannelObject("Bench", name, x, {**told, "unit_string": u}) for name, x, u in channels]
+            [
+                ChannelObject("Bench", name, x, {**timing, "unit_string": u})
+                for name, x, u in channels
+            ]
         )
 
 

@@ -94,4 +94,4 @@ class TrackState(NamedTuple):
     origin: float | None = None  # where the carriage stood in the first full window [m]
     task: Task | None = None  # of the review of the record that is under way
     withheld: Withheld | None = None  # likewise
-    resets_told: int = 0  # of `resets`, those that a tick has flagged
+    resets_flagged: int = 0  # of `resets`, those that a tick has flagged

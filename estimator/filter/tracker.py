@@ -142,8 +142,8 @@ class Tracker:
         account = self._account(state, snapshot, now, status, aids)
         if aids and account.flags & Flag.PRIOR:
             state = state._replace(doubted=state.doubted + 1)
-        if aids and state.resets != state.resets_told:
-            state = state._replace(resets_told=state.resets)
+        if aids and state.resets != state.resets_flagged:
+            state = state._replace(resets_flagged=state.resets)
         return state, account
 
     def _counted(self, now: WheelState, snapshot: Snapshot, window: float) -> WheelState:
@@ -352,7 +352,7 @@ class Tracker:
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
             + Flag.K_ESTIMATED * self._knows_k(state.estimate)
             + Flag.GATED * (not all([aid.accepted for aid in aids]))
-            + Flag.RESET * (bool(aids) and state.resets > state.resets_told)
+            + Flag.RESET * (bool(aids) and state.resets > state.resets_flagged)
             + Flag.MISMATCH * disagrees
             + Flag.CHANGED * (trust.since_change < CHANGE.settled)
             + Flag.TORQUE_OFF * (disagrees and not by_pull)

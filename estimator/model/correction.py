@@ -65,7 +65,7 @@ class Correction:
         beyond = np.maximum(self._low - known, 0.0) + np.maximum(known - self._high, 0.0)
         return np.asarray(np.exp(-0.5 * np.sum(beyond**2, axis=1)))
 
-    def told(self, inside: Array, squares: Array) -> Array:
+    def learnt(self, inside: Array, squares: Array) -> Array:
         """Share (n,) of the prior variance that was learnt of, from ρ (n,) and |φ|² (n,)."""
         return np.asarray(inside**2 * np.minimum(squares + LEFT_OUT, 1.0))
 
@@ -74,12 +74,12 @@ class Correction:
         between = covariance(conditions, self._points)
         inside = self.inside(conditions)
         half = np.linalg.solve(self._root, between.T)
-        told = self.told(inside, np.sum(half**2, axis=0))
+        learnt = self.learnt(inside, np.sum(half**2, axis=0))
 
         scale = weight * self._size
         values = (between @ self._weights).reshape(len(inside), 3, 1 + self.directions)
         values = values * (scale * inside[:, None])[:, :, None]
-        rest = np.abs(scale) * np.sqrt(1.0 - told[:, None] * self._kept)
+        rest = np.abs(scale) * np.sqrt(1.0 - learnt[:, None] * self._kept)
         return At(values[:, :, 0], values[:, :, 1:], rest)
 
     def of(self, situation: Situation) -> Array:

@@ -62,7 +62,7 @@ def carry_over(pipeline: Pipeline, state: State, before: Settings) -> State:
         choosing=old.choosing,
         updates=old.updates,
         resets=old.resets,
-        resets_told=old.resets,
+        resets_flagged=old.resets,
         began=old.began,
         recall=recall,
         origin=origin,

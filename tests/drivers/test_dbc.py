@@ -38,7 +38,7 @@ def read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("beside", "told"),
+    ("beside", "reported"),
     [
         (
             'BO_ 5 A: 2 X\n SG_ P : 0|8@1+ (1,0) [0|1] "" X\n SG_ Q : 3|1@1+ (1,0) [0|1] "" X\n',
@@ -55,10 +55,10 @@ def read(tmp_path):
         ("", ""),
     ],
 )
-def test_what_nobody_listens_to_does_not_matter_and_is_told(read, beside, told):
+def test_what_nobody_listens_to_does_not_matter_and_is_told(read, beside, reported):
     values, amiss = read(HEAD + WANTED + beside)
     assert values == [(0x03020100,)]
-    assert told in amiss if told else amiss == ""
+    assert reported in amiss if reported else amiss == ""
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_database_of_any_editor_is_read(read, disguise):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("Wheel: 8", "Wheel: 100000000", "100000000 bytes"),
         ("(1,0) [0|4", "(0,0) [0|4", "scale 0"),
@@ -96,8 +96,8 @@ def test_a_database_of_any_editor_is_read(read, disguise):
         ("Wheel:", "Wheels:", "did you mean Wheels"),
     ],
 )
-def test_what_is_listened_to_and_cannot_be_read_is_one_line(read, old, new, told):
-    with pytest.raises(DeviceSettingsError, match=told) as error:
+def test_what_is_listened_to_and_cannot_be_read_is_one_line(read, old, new, reported):
+    with pytest.raises(DeviceSettingsError, match=reported) as error:
         read((HEAD + WANTED).replace(old, new))
     assert "bench.dbc" in str(error.value) and len(str(error.value)) <= 300
 

@@ -106,6 +106,6 @@ def begins_anew(folder, content):
         daemon.ready()
         daemon.stop()
     prior = rig.TESTBED.settings.soil.cohesion
-    told = daemon.lines("begins with the stated prior")
+    reported = daemon.lines("begins with the stated prior")
     first = rows(daemon.path(), "/tick")[0]
-    return len(told) == 1 and first["cohesion"] == prior.value and verified(daemon.path())
+    return len(reported) == 1 and first["cohesion"] == prior.value and verified(daemon.path())

@@ -106,8 +106,8 @@ def test_step(tmp_path, figure):
 
     daemon, device = undisturbed(tmp_path, play)
     lines = [line for _, line in daemon.lines("its clock stepped")]
-    told = [float(re.search(r"stepped by (\S+) s", line).group(1)) for line in lines]
-    assert told == pytest.approx(STEPS, abs=5e-3), lines
+    reported = [float(re.search(r"stepped by (\S+) s", line).group(1)) for line in lines]
+    assert reported == pytest.approx(STEPS, abs=5e-3), lines
     assert sum("its clock stepped" in line for line in log_lines(daemon.path())) == len(STEPS)
     assert device["clock_steps"] == len(STEPS)
     lost = device["mistimed"] / 2 / SECOND / len(STEPS)

@@ -109,6 +109,6 @@ def test_a_recording_that_is_cut(tmp_path, figure):
         cut.write_bytes(data[: len(data) * share // 100])
         cut.with_suffix(".out").unlink(missing_ok=True)
         _, said = in_process("recover", cut, "-o", cut.with_suffix(".out"))
-        told = said[-1]
-        silent += "it ends" not in told or "what came later is not in it" not in told
+        reported = said[-1]
+        silent += "it ends" not in reported or "what came later is not in it" not in reported
     figure(CUT, "recover", "of 19 cuts, the end not told", silent, limit=0)

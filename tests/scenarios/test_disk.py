@@ -100,12 +100,12 @@ def test_disk_full_for_longer_than_the_queue_holds(tmp_path, small_disk, seed, f
         daemon.wait_status(lambda report: report["log"]["dropped"] > 2000)
         ballast.unlink()
         daemon.heard("log writing")
-        told = re.search(r"again, (\d+) messages were lost", daemon.lines("log writing")[0][1])
+        reported = re.search(r"again, (\d+) messages were lost", daemon.lines("log writing")[0][1])
         time.sleep(1.5)
         daemon.stop()
         accepted, written, dropped, queued = daemon.account()
         kept = copied(daemon, tmp_path)
-    assert told and 0 < int(told[1]) <= dropped, daemon.text
+    assert reported and 0 < int(reported[1]) <= dropped, daemon.text
     figure(AGAIN, WIRES, "lines that do not say what was lost", 0, limit=0)
     first, second = recordings(kept)
     assert first.run.lost_before == 0 and second.run.lost_before == dropped

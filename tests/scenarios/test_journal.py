@@ -164,13 +164,13 @@ def wait_until_told(daemon, before, fault):
     for what, counted in fault.counted.items():
         happened = counted(report)
         assert happened > 0
-        daemon.until(lambda w=what, n=happened: told(daemon, w) >= n, f"not all told of {what}")
+        daemon.until(lambda w=what, n=happened: reported(daemon, w) >= n, f"not all told of {what}")
 
     for words in fault.ended:
         daemon.until(lambda w=words: matching(daemon.said[before:], w), f"did not say {words}")
 
 
-def told(daemon, what):
+def reported(daemon, what):
     """How many the lines about a counter tell of, since the start."""
     before, now = 0, 0  # in what is over, in what goes on
     for line in [line for _, line in list(daemon.said) if line.startswith(f"{what}: ")]:

@@ -31,21 +31,21 @@ def test_the_library_is_there_and_compact():
 
 def test_good_sessions_lose_nothing_and_bad_ones_say_so():
     """What the names promise stands in the outcomes."""
-    told = {one.name: one.outcome for one in sessions()}
+    reported = {one.name: one.outcome for one in sessions()}
     for name in ("good-slcan", "good-multicast", "good-ascii", "wraps"):
-        devices = told[name]["devices"]
+        devices = reported[name]["devices"]
         assert not devices["encoders"].keys() - {"good", "unknown"}, name
-        assert told[name]["last"]["updates"] > 5 and told[name]["last"]["jumps"] == 0, name
+        assert reported[name]["last"]["updates"] > 5 and reported[name]["last"]["jumps"] == 0, name
     for name, count in {
         "noise": "garbage", "flipped-bits": "bad", "garbage-8-mb": "garbage",
         "clock-step": "clock_steps", "wrong-stamps": "mistimed", "frames-lost": "lost",
         "frames-twice": "duplicates", "silence-16-bit": "turns_unknown",
     }.items():  # fmt: skip
-        assert told[name]["devices"]["encoders"][count], name
-    assert told["garbage-8-mb"]["devices"]["encoders"]["garbage"] > 7_500_000
-    assert told["no-numbers"]["devices"]["bus"]["quarantined"]
-    assert told["random-counter"]["last"]["jumps"] > 100
-    late = told["wrench-late"]
+        assert reported[name]["devices"]["encoders"][count], name
+    assert reported["garbage-8-mb"]["devices"]["encoders"]["garbage"] > 7_500_000
+    assert reported["no-numbers"]["devices"]["bus"]["quarantined"]
+    assert reported["random-counter"]["last"]["jumps"] > 100
+    late = reported["wrench-late"]
     assert late["channels"]["wrench"]["longest_gap"] < 8.0, "by its own clock, not by receipt"
     assert not late["devices"]["bus"].keys() - {"good", "unknown", "lost", "incomplete"}
-    assert told["frozen-pot"]["stuck"].keys() == {"sinkage_pot"}
+    assert reported["frozen-pot"]["stuck"].keys() == {"sinkage_pot"}

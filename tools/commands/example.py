@@ -50,7 +50,7 @@ def main(argv: Sequence[str]) -> int:
             _write_run(path, configuration, LOADS[seed], acting, seed)
             progress.advance()
 
-    print("\n".join(_told(folder, arguments.effect)))
+    print("\n".join(_summary(folder, arguments.effect)))
     return DONE
 
 
@@ -71,7 +71,7 @@ def _write_run(
         raise unwritten(error) from None
 
 
-def _told(folder: Path, effects: Sequence[str]) -> Iterator[str]:
+def _summary(folder: Path, effects: Sequence[str]) -> Iterator[str]:
     loads = ", ".join(f"{load:.0f}" for load in LOADS)
     yield f"{folder}: testbed.yaml, and a run under each of {loads} N"
 

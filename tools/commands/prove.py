@@ -49,7 +49,7 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
         return DONE
 
     rows = [row(spec) for spec in specs]
-    _tell(rows, begun, output)
+    _print(rows, begun, output)
     return FAILED if any(each.verdict == "failed" for each in rows) else DONE
 
 
@@ -97,7 +97,7 @@ def _run(specs: Sequence[trial.WorkerSpec], arguments: argparse.Namespace, seals
         )
 
 
-def _tell(rows: Sequence[CaseRow], begun: batch.Batch, output: Path) -> None:
+def _print(rows: Sequence[CaseRow], begun: batch.Batch, output: Path) -> None:
     counted = score.score(rows)
     (output / SCORE).write_text(
         json.dumps(counted, indent=1, ensure_ascii=False, allow_nan=False), encoding="utf-8"

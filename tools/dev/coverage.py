@@ -108,7 +108,7 @@ def _write(path: Path) -> int:
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(BEGIN)
     after = rest.partition(END)[2]
-    part = "\n".join(["", *_told(files), ""])
+    part = "\n".join(["", *_table(files), ""])
     PAGE.write_text(f"{before}{BEGIN}{part}{END}{after}", encoding="utf-8")
 
     found = packages(files)
@@ -140,7 +140,7 @@ def _covered(file: Mapping[str, Any]) -> Covered:
     return Covered(summary["covered_branches"], summary["num_branches"])
 
 
-def _told(files: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+def _table(files: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     """The lines of the page."""
     yield "| package | branches | taken by some test | |"
     yield "|---|---|---|---|"

@@ -226,8 +226,16 @@ def on_wires(arguments: Namespace) -> list[str]:
     os.environ.update(unit_environment())
 
     with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
-        told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
-        with Child(StopRequest(), "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
+        options = [
+            "--folder",
+            name,
+            "--wait",
+            "--seconds",
+            str(seconds + 10.0),
+            "--plant",
+            "linear",
+        ]
+        with Child(StopRequest(), "testbed", "gritd.tools.testbed.testbed", *options) as testbed:
             path = testbed.wait_for("configuration ", PREPARED).split(" ", 1)[1]
             shorten_parts(Path(path), arguments.part)
             with Child(
@@ -293,12 +301,12 @@ def busy(number: int) -> Iterator[None]:
 
 def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
     """A look at the daemon every few seconds, and a line of it every tenth of the time."""
-    began, told = time.monotonic(), 0
+    began, printed = time.monotonic(), 0
     while (passed := time.monotonic() - began) < seconds:
         yield (report := look(path))
 
-        if int(10.0 * passed / seconds) > told:
-            told = int(10.0 * passed / seconds)
+        if int(10.0 * passed / seconds) > printed:
+            printed = int(10.0 * passed / seconds)
             print(
                 f"after {passed / 60:.1f} min: {report['memory']:.2f} MB, "
                 f"load {report['load']:.1f}",

@@ -99,9 +99,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def on_wires(folder: Path, arguments: Namespace, stop: StopRequest) -> dict[str, Any]:
     """One run with its stretches; a report of the daemon."""
     seconds = 8 * (arguments.seconds + SETTLED) + SPARE
-    told = ["--seconds", str(seconds), "--folder", str(folder), "--wait"]
+    options = ["--seconds", str(seconds), "--folder", str(folder), "--wait"]
 
-    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
+    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *options) as testbed:
         config = testbed.wait_for("configuration ", READY).split(" ", 1)[1]
         with Child(stop, "daemon", "gritd", "run", "--config", config) as daemon:
             for _ in range(2):
@@ -113,7 +113,7 @@ def on_wires(folder: Path, arguments: Namespace, stop: StopRequest) -> dict[str,
             daemon.stop()
 
     recording = read(next(folder.glob("*.mcap")))
-    _tell(stretches, recording)
+    _print(stretches, recording)
     command = (sys.executable, "-m", "gritd", "replay", str(recording.path), "--verify")
     subprocess.run(command, check=True)
     return report
@@ -242,7 +242,7 @@ def _memory(pid: int) -> float:
     return int(pages) * float(os.sysconf("SC_PAGESIZE"))
 
 
-def _tell(stretches: Sequence[CostSpan], recording: Recording) -> None:
+def _print(stretches: Sequence[CostSpan], recording: Recording) -> None:
     loop = recording.arrays("/loop")
     print(f"load average {os.getloadavg()[1]:.1f} on {os.cpu_count()} cores; {recording.path.name}")
     lost = loop[["dropped", "log_dropped"]][-1].tolist()

@@ -136,8 +136,8 @@ def test_a_wall_clock_that_is_set_is_a_line_each_time_and_the_stamps_go_on(bench
 
     last = bench.serve(act, until=lambda daemon: len(looks) >= 6)
     assert last.state == "closed"
-    told = [line for line in bench.lines() if line.startswith("wall clock stepped by ")]
-    assert [line.split(".")[0] for line in told] == [
+    reported = [line for line in bench.lines() if line.startswith("wall clock stepped by ")]
+    assert [line.split(".")[0] for line in reported] == [
         "wall clock stepped by +3600",
         "wall clock stepped by -3600",
     ]

@@ -58,18 +58,18 @@ def test_the_switch_interval_is_put_back():
 
 
 def test_the_loop_comes_before_the_others_where_real_time_is_permitted():
-    told: list[tuple[str, int, int]] = []
+    reported: list[tuple[str, int, int]] = []
 
     def run() -> None:
         why = real_time()
         others = os.sched_getparam(0).sched_priority
         first()
-        told.append((why, others, os.sched_getparam(0).sched_priority))
+        reported.append((why, others, os.sched_getparam(0).sched_priority))
 
     thread = Thread(target=run)
     thread.start()
     thread.join()
-    why, others, loop = told[0]
+    why, others, loop = reported[0]
     if why:
         assert others == loop == 0, "without real time nothing changes"
     else:

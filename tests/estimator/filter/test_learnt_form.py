@@ -66,16 +66,22 @@ def ticks(settings, readings, engine=None, restored=None):
     state is written and read back.
     """
     pipeline = Pipeline(settings, engine)
-    state, t, batch, told, tick = pipeline.start(), readings[0].received + 100_000_000, [], [], ()
+    state, t, batch, reported, tick = (
+        pipeline.start(),
+        readings[0].received + 100_000_000,
+        [],
+        [],
+        (),
+    )
     for reading in readings:
         while reading.received > t:
             state, tick = pipeline.step(state, batch, t)
-            told.append(TICK_TOPIC.codec.encode(tick))
+            reported.append(TICK_TOPIC.codec.encode(tick))
             batch, t = [], t + 100_000_000
-            if len(told) == restored:
+            if len(reported) == restored:
                 state = checkpoint.decode(checkpoint.encode(state), pipeline.settings)
         batch.append(reading)
-    return told, dict(zip(TICK_NAMES, tick, strict=True))
+    return reported, dict(zip(TICK_NAMES, tick, strict=True))
 
 
 def off(last):

@@ -40,17 +40,17 @@ def run(consumed):
 
 
 def test_spread_over_ticks_or_at_once_a_window_leaves_the_same(consumed, monkeypatch):
-    spread, told = run(consumed)
+    spread, reported = run(consumed)
     step = Reviewer.step
     monkeypatch.setattr(Reviewer, "step", lambda self, state: state)
     monkeypatch.setattr(Reviewer, "finished", lambda self, state: _finished(self, state, step))
     at_once, _ = run(consumed)
 
-    windows = [n for n, tick in enumerate(told) if tick["torque_z"] != 0.0]
+    windows = [n for n, tick in enumerate(reported) if tick["torque_z"] != 0.0]
     assert len(windows) > 60
     for n in windows:
         assert spread[n].track == at_once[n].track
-    assert any(tick["flags"] & Flag.CHANGED for tick in told)
+    assert any(tick["flags"] & Flag.CHANGED for tick in reported)
 
 
 def test_no_tick_between_windows_takes_more_than_its_share_of_tangents(consumed, monkeypatch):

@@ -78,7 +78,7 @@ def test_unrest_after_a_change_dies_down():
     assert unrest[0] > unrest[1] > 50.0 * unrest[2] > 0.0
 
 
-def told(ticks):
+def reported(ticks):
     """The ticks at which the prior is reported."""
     return [t for t in ticks if t["flags"] & Flag.PRIOR]
 
@@ -92,8 +92,8 @@ def test_a_torque_that_no_soil_explains_leaves_the_prior_as_the_answer(offset):
     _, ticks = run(replace(RIG, channels=channels), TRUTH, THREE_LOADS, plant=RIG)
     updated = [t for t in ticks if t["status"] in UPDATED]
     assert ticks[-1]["flags"] & Flag.PRIOR
-    assert len(told(updated)) > 0.5 * len(updated)
-    for tick in told(ticks):
+    assert len(reported(updated)) > 0.5 * len(updated)
+    for tick in reported(ticks):
         assert tick["cohesion"] == RIG.soil.cohesion.value
         assert tick["cohesion_sigma"] == pytest.approx(RIG.soil.cohesion.sigma)
         assert tick["tan_phi"] == RIG.soil.tan_phi.value
@@ -101,11 +101,11 @@ def test_a_torque_that_no_soil_explains_leaves_the_prior_as_the_answer(offset):
 
 def test_an_honest_run_never_tells_the_prior():
     _, ticks = run(RIG, TRUTH, THREE_LOADS)
-    assert not told(ticks) and not any(t["flags"] & Flag.CHANGED for t in ticks)
+    assert not reported(ticks) and not any(t["flags"] & Flag.CHANGED for t in ticks)
 
 
 def test_a_bound_that_the_prior_allows_is_an_answer():
     """Dry sand without cohesion, and a prior that knows of it."""
     settings = replace(RIG, soil=replace(RIG.soil, cohesion=Uncertain(60.0, 60.0)))
     _, ticks = run(settings, (0.0, 0.62, 0.025), THREE_LOADS)
-    assert not told(ticks) and ticks[-1]["cohesion"] < 3.0 * ticks[-1]["cohesion_sigma"]
+    assert not reported(ticks) and ticks[-1]["cohesion"] < 3.0 * ticks[-1]["cohesion_sigma"]

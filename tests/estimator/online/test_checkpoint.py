@@ -72,7 +72,7 @@ def test_a_state_of_an_older_version_may_lack_the_last_fields(consumed):
     assert track.pop() == state.track.origin
     restored = checkpoint.decode(json.dumps(parts), pipeline.settings)
     assert restored.track == state.track._replace(
-        origin=None, task=None, withheld=None, resets_told=0
+        origin=None, task=None, withheld=None, resets_flagged=0
     )
     track += [None, None, None, 0, 1]
     with pytest.raises(ValueError, match="not a state of this configuration"):

@@ -30,8 +30,8 @@ for number in range({SIGNALS}):
 def test_no_signal_is_lost_and_none_blocks():
     called = [[sys.executable, "-c", MANY, str(seed)] for seed in range(AT_ONCE)]
     children = [subprocess.Popen(words, stderr=subprocess.PIPE, text=True) for words in called]
-    told = [child.communicate()[1] for child in children]
-    assert [child.returncode for child in children] == [0] * AT_ONCE, told
+    reported = [child.communicate()[1] for child in children]
+    assert [child.returncode for child in children] == [0] * AT_ONCE, reported
 
 
 def test_it_is_not_set_before_and_stays_set_after():

@@ -52,8 +52,8 @@ def test_single_spikes_change_nothing_and_are_counted(tmp_path: Path, seed: int)
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_steady_zero_is_not_called_creeping(tmp_path: Path, seed: int) -> None:
-    told = heights(tmp_path / "r.mcap", seed).warnings
-    assert not [line for line in told if "creep" in line or "spike" in line]
+    reported = heights(tmp_path / "r.mcap", seed).warnings
+    assert not [line for line in reported if "creep" in line or "spike" in line]
 
 
 @pytest.mark.parametrize("creep", [0.02, -0.02, 0.01])

@@ -106,6 +106,6 @@ def test_the_live_sensors_are_read_when_enter_is_pressed(
     monkeypatch.setattr("sys.stdin", StringIO())
     options = ["--known", "0, 10, 20 mm", "--seconds", "0.3", "--config", str(rig(tmp_path))]
     assert calibrate.main(["pot", *options, "--png", str(tmp_path / "fit.png")]) == 0
-    told = capsys.readouterr().out.partition("channels.sinkage_pot.scale: ")[2]
-    assert float(told.split()[0]) == pytest.approx(25.0, abs=0.5)
+    reported = capsys.readouterr().out.partition("channels.sinkage_pot.scale: ")[2]
+    assert float(reported.split()[0]) == pytest.approx(25.0, abs=0.5)
     assert (tmp_path / "fit.png").stat().st_size > 5000

@@ -69,7 +69,7 @@ def test_any_columns_give_the_soil(tmp_path: Path, kind: str, text: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [
         (GERMAN.replace("Weg [mm]", "Wegg"), "found no column"),
         (GERMAN.replace("plate: 60 mm\n", ""), "--plate"),
@@ -79,7 +79,7 @@ def test_any_columns_give_the_soil(tmp_path: Path, kind: str, text: str) -> None
     ],
 )
 def test_a_wrong_map_is_one_line(
-    tmp_path: Path, text: str, told: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, text: str, reported: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = rig(tmp_path / "bench")
     (tmp_path / "map.yaml").write_text(text)
@@ -87,7 +87,7 @@ def test_a_wrong_map_is_one_line(
     command = ["calibrate", "soil", str(tmp_path / "press-1.csv"), "--config", str(config)]
     assert cli.main([*command, "--map", str(tmp_path / "map.yaml")]) in (2, 3)
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and (told in said or "expected" in said)
+    assert said.count("\n") == 1 and (reported in said or "expected" in said)
 
 
 def test_where_a_movement_turns_round_there_is_no_spike() -> None:

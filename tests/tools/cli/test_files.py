@@ -60,7 +60,7 @@ def test_a_trusted_file_that_anybody_may_change_is_told(
         (tmp_path / name).write_bytes(packaged(name).read_bytes())
         (tmp_path / name).chmod(0o666 if name == writable_one else 0o644)
     source = tmp_path / "testbed.yaml"
-    told = open_to_all(source, load(source).settings)
-    assert [line.partition(":")[0] for line in told] == [
+    reported = open_to_all(source, load(source).settings)
+    assert [line.partition(":")[0] for line in reported] == [
         str(tmp_path / name) for name in (writable_one,) if name
     ]

@@ -67,7 +67,7 @@ def test_the_files_that_were_written_are_told(
     own = tmp_path / "testbed.yaml"
     own.write_bytes(packaged().read_bytes())
     (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
-    one, told = [long, "--config", str(own), "--quick", "--jobs", "1"], "wrote {}"
+    one, reported = [long, "--config", str(own), "--quick", "--jobs", "1"], "wrote {}"
     names = [tmp_path / name for name in ("a.json", "b.html", "c.yaml")]
 
     capsys.readouterr()
@@ -75,7 +75,7 @@ def test_the_files_that_were_written_are_told(
     assert main([*one, *(word for pair in options for word in pair)]) == 0
     said = capsys.readouterr()
     assert [line for line in said.err.splitlines() if "wrote" in line] == [
-        told.format(name) for name in names
+        reported.format(name) for name in names
     ]
     assert all(name.exists() for name in names) and "wrote" not in said.out
 
@@ -185,18 +185,18 @@ def test_a_reference_is_the_recording_that_was_diagnosed(run: Path, tmp_path: Pa
     """By its SHA-256; one that is gone is named with both places where it was looked for."""
     earlier = tmp_path / "earlier.json"
     files = {str(run): sha256(run)}
-    told: dict[str, object] = {"verdict": "consistent", "redo": {"files": files}}
+    reported: dict[str, object] = {"verdict": "consistent", "redo": {"files": files}}
 
-    earlier.write_text(json.dumps(told))
+    earlier.write_text(json.dumps(reported))
     assert given([earlier], "same").files == (run,)
 
     files[str(run)] = "0" * 64
-    earlier.write_text(json.dumps(told))
+    earlier.write_text(json.dumps(reported))
     line, code = said(run, "--config", packaged(), "--reference", earlier)
     assert "expected the one that it diagnosed, by its SHA-256" in line and code == DAMAGED
 
-    told["redo"] = {"files": {"/nowhere/gone.mcap": "0" * 64}}
-    earlier.write_text(json.dumps(told))
+    reported["redo"] = {"files": {"/nowhere/gone.mcap": "0" * 64}}
+    earlier.write_text(json.dumps(reported))
     line, code = said(run, "--config", packaged(), "--reference", earlier)
     assert "/nowhere/gone.mcap" in line and str(tmp_path / "gone.mcap") in line and code == USAGE
 

@@ -37,13 +37,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [made(folder, load) for load in (35, 60, 100)]
 
 
-def told(runs: list[Path], out: Path, *more: str) -> dict:
+def reported(runs: list[Path], out: Path, *more: str) -> dict:
     assert cli.main(["estimate", *map(str, runs), "--json", str(out), *more]) == 0
     return json.loads(out.read_text())
 
 
 def test_runs_together_know_what_none_knows_alone(runs, tmp_path, capsys):
-    found = told(runs, tmp_path / "out.json")
+    found = reported(runs, tmp_path / "out.json")
     for name, truth in SOIL.items():
         value, sigma = found["together"][name]["value"], found["together"][name]["sigma"]
         assert abs(value - truth) < 2.0 * sigma
@@ -54,9 +54,9 @@ def test_runs_together_know_what_none_knows_alone(runs, tmp_path, capsys):
 
 
 def test_a_stated_repeatability_widens_what_they_know(runs, tmp_path, capsys):
-    same = told(runs, tmp_path / "a.json")["together"]
+    same = reported(runs, tmp_path / "a.json")["together"]
     options = ["--repeatability", "c=50 Pa", "--repeatability", "tan_phi=0.01"]
-    other = told(runs, tmp_path / "b.json", *options)["together"]
+    other = reported(runs, tmp_path / "b.json", *options)["together"]
     assert other["c"]["sigma"] > 1.5 * same["c"]["sigma"]
     assert "repeatability between preparations, σ: c 50 Pa" in capsys.readouterr().out
 

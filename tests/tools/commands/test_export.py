@@ -118,8 +118,12 @@ def test_nested_messages_become_columns_and_the_rest_is_named(tmp_path, capsys):
 
     command = ["export", str(tmp_path / "a.mcap"), "--csv", "-o", str(tmp_path / "out")]
     assert cli.main(command) == 3
-    told = capsys.readouterr().err
-    assert "/camera" in told and "protobuf" in told and "/scan.ranges, an array of 500" in told
+    reported = capsys.readouterr().err
+    assert (
+        "/camera" in reported
+        and "protobuf" in reported
+        and "/scan.ranges, an array of 500" in reported
+    )
 
     rows = rows_of(tmp_path / "out" / "joints.csv")
     assert [float(row["position[wheel]"]) for row in rows] == [0.1 * at for at in range(20)]

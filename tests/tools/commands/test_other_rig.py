@@ -37,8 +37,12 @@ def test_another_testbeds_configuration_is_refused(
     output = ["-o", str(folder / "page.html")] if command == "report" else []
     other = ["--config", str(folder / "other.yaml")]
     assert main([command, str(folder / "run.mcap"), *other, *output]) == 2
-    told = capsys.readouterr().err
-    assert "another testbed" in told and "--other-rig" in told and len(told.splitlines()) == 1
+    reported = capsys.readouterr().err
+    assert (
+        "another testbed" in reported
+        and "--other-rig" in reported
+        and len(reported.splitlines()) == 1
+    )
     assert not (folder / "page.html").exists()
 
 

@@ -12,15 +12,17 @@ from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.tools.commands.replay_report import report
 
 
-@pytest.mark.parametrize("flags, told", [(Flag.NONE, False), (Flag.PRIOR | Flag.MISMATCH, True)])
-def test_a_soil_that_is_the_prior_is_said_to_be(flags, told):
+@pytest.mark.parametrize(
+    "flags, reported", [(Flag.NONE, False), (Flag.PRIOR | Flag.MISMATCH, True)]
+)
+def test_a_soil_that_is_the_prior_is_said_to_be(flags, reported):
     rows = np.ones(3, dtype=[(name, "<f8") for name in TICK_NAMES])
-    rows["status"], rows["flags"] = Status.MISMATCH if told else Status.TRACKING, flags
+    rows["status"], rows["flags"] = Status.MISMATCH if reported else Status.TRACKING, flags
     rows["stamp"] = rows["evaluated"] = 1e9 * np.arange(3)
     lines = report(Path("run.mcap"), rows, "ticks").splitlines()
     said = "  soil       the prior: the filter's own estimate is not believed at the end"
-    assert (said in lines) == told
-    assert any("MISMATCH" in line for line in lines) == told
+    assert (said in lines) == reported
+    assert any("MISMATCH" in line for line in lines) == reported
 
 
 @pytest.mark.parametrize("consistency", [float("nan"), 1.25])

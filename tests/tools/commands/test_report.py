@@ -60,8 +60,15 @@ def test_the_curves_have_the_configured_effects(effect: str, value: float, tmp_p
         "segments:\n  - {duration: 6 s, load: 70 N, slip: 0.3, speed: 20 mm/s}\n"
     )
     run = tmp_path / "run.mcap"
-    told = ["--schedule", str(tmp_path / "s.yaml"), "--effect", f"{effect}={value}", "-o", str(run)]
-    assert simulate.main(told) == 0
+    options = [
+        "--schedule",
+        str(tmp_path / "s.yaml"),
+        "--effect",
+        f"{effect}={value}",
+        "-o",
+        str(run),
+    ]
+    assert simulate.main(options) == 0
 
     name, _, parameter = effect.partition(".")
     settings, known = load(packaged()).settings, Uncertain(value, 0.0)

@@ -269,8 +269,8 @@ def with_runs(notes: tuple[str, str], operators: tuple[str, str]) -> str:
         for at in range(2)
     ]
     found = cases.explained()
-    told = {"rig": "bench <three>", "runs": rows}
-    return diagnosis.render(replace(found, redo={**found.redo, **told}))
+    reported = {"rig": "bench <three>", "runs": rows}
+    return diagnosis.render(replace(found, redo={**found.redo, **reported}))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from gritd.tools.report.words import sentence
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         ("torque differs", "Torque differs."),
         ("run-1.mcap was recorded with wheel.radius 0.08.", "run-1.mcap was recorded with"),
@@ -16,5 +16,5 @@ from gritd.tools.report.words import sentence
         ("", ""),
     ],
 )
-def test_a_sentence_leaves_the_name_of_a_file_as_it_is(words: str, told: str) -> None:
-    assert sentence(words).startswith(told) and sentence(words).endswith("." if words else "")
+def test_a_sentence_leaves_the_name_of_a_file_as_it_is(words: str, reported: str) -> None:
+    assert sentence(words).startswith(reported) and sentence(words).endswith("." if words else "")

@@ -42,9 +42,9 @@ def heard(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 def listened(client: Any) -> tuple[dict[str, Any], list[tuple[str, int, SimpleNamespace]]]:
     offered: dict[str, Any] = {}
     while len(offered) < len(TOPICS):
-        told = json.loads(client.recv(PATIENCE))
-        if told["op"] == "advertise":
-            offered |= {channel["topic"]: channel for channel in told["channels"]}
+        reported = json.loads(client.recv(PATIENCE))
+        if reported["op"] == "advertise":
+            offered |= {channel["topic"]: channel for channel in reported["channels"]}
 
     numbered = list(offered.values())
     wanted = [{"id": n, "channelId": channel["id"]} for n, channel in enumerate(numbered)]

@@ -49,11 +49,11 @@ def recordings(paths: list[Path]) -> Iterator[Recordings]:
 def test_a_moment_has_the_values_of_its_tick(recordings: Recordings, ticks: Rows) -> None:
     for row in (len(ticks) // 3, len(ticks) - 1):
         at = (ticks["evaluated"][row] - ticks["evaluated"][0]) * 1e-9
-        told = recordings.moment(0, "time", at)
-        assert told["sequence"] == ticks["sequence"][row]
-        assert told["values"][0]["value"] == f"{ticks['cohesion'][row]:.0f}"
-        assert told["values"][1]["value"] == f"{ticks['tan_phi'][row]:.4f}"
-        json.dumps(told["headline"])
+        reported = recordings.moment(0, "time", at)
+        assert reported["sequence"] == ticks["sequence"][row]
+        assert reported["values"][0]["value"] == f"{ticks['cohesion'][row]:.0f}"
+        assert reported["values"][1]["value"] == f"{ticks['tan_phi'][row]:.4f}"
+        json.dumps(reported["headline"])
 
 
 def test_a_first_look_and_the_whole_show_the_same_run(

@@ -25,7 +25,7 @@ from gritd.tools.cli.offspring import bind_to
 from gritd.tools.dev.sensitivity.numbers import Field, changed, watched
 from gritd.tools.dev.sensitivity.outcome import Diagnose, DiagnosisOutcome
 
-Told = Callable[["SensitivityCase", DiagnosisOutcome | None, float], None]
+Report = Callable[["SensitivityCase", DiagnosisOutcome | None, float], None]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _digest(handed: tuple[Any, ...]) -> bytes:
 class Forks:
     """A diagnosis that forks a child for every case, where the case's number is first read.
 
-    jobs: how many processes work at once; told: is called in the child with its case, its outcome
+    jobs: how many processes work at once; report: is called in the child with its case, its outcome
     and its seconds; no outcome means that nothing moved; end: [s], as time.monotonic counts, after
     which nothing is forked.
     """
@@ -82,10 +82,10 @@ class Forks:
         reading: BaseDiagnosis,
         cases: Collection[SensitivityCase],
         jobs: int,
-        told: Told,
+        report: Report,
         end: float,
     ) -> None:
-        self._reading, self._told, self._end = reading, told, end
+        self._reading, self._report, self._end = reading, report, end
         self._cases: dict[
             Field, list[tuple[SensitivityCase, Any]]
         ] = {}  # with the number's other value
@@ -161,7 +161,7 @@ class Forks:
         """The end of a child, without what its parent does at its own end."""
         assert self._case
         try:
-            self._told(self._case, outcome, time.process_time())
+            self._report(self._case, outcome, time.process_time())
         finally:
             os._exit(0)
 

@@ -14,7 +14,7 @@ from gritd.estimator.messages.status import UPDATED, Flag
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.dev.soil_changes.cases import SoilChangeCase
 
-TOLD = Flag.MISMATCH | Flag.RESET | Flag.CHANGED | Flag.PRIOR
+WARNING = Flag.MISMATCH | Flag.RESET | Flag.CHANGED | Flag.PRIOR
 BACK, STAYS = 15.0, 5.0  # [s] in which σ is to hold again, and for how long at least
 
 
@@ -25,7 +25,7 @@ class Track(NamedTuple):
     error: Array  # (n, 2) of c [Pa] and tan φ
     sigma: Array  # (n, 2)
     nees: Array  # normalised error squared of the pair, 2 when honest
-    told: NDArray[np.bool_]  # whether a flag warns of the estimate
+    warned: NDArray[np.bool_]  # whether a flag warns of the estimate
 
     @property
     def away(self) -> Array:
@@ -57,7 +57,7 @@ def followed(case: SoilChangeCase) -> Track:
                 error,
                 np.sqrt(np.diag(covariance)),
                 error @ np.linalg.solve(covariance, error),
-                bool(account.flags & TOLD),
+                bool(account.flags & WARNING),
             )
         )
 
@@ -70,7 +70,7 @@ class FollowedCase(NamedTuple):
     driven: float  # after the change began
     beyond: float  # of it, beyond 3σ without a flag
     far: float  # of it, beyond 5σ without a flag
-    told: float  # of it, with a flag
+    warned: float  # of it, with a flag
     back: float  # from the end of the change until 2σ holds; inf where it never does
     nees: float  # at the end
 
@@ -79,13 +79,13 @@ def judged(case: SoilChangeCase, track: Track) -> FollowedCase:
     """How honest σ was from the change on."""
     step = 1.0 / case.settings.rates.update
     after = track.time >= case.begins
-    silent = after & ~track.told
+    silent = after & ~track.warned
 
     return FollowedCase(
         driven=step * float(np.sum(after)),
         beyond=step * float(np.sum(silent & (track.away > 3.0))),
         far=step * float(np.sum(silent & (track.away > 5.0))),
-        told=step * float(np.sum(after & track.told)),
+        warned=step * float(np.sum(after & track.warned)),
         back=_back(track, case.settled, step),
         nees=float(track.nees[-1]),
     )
@@ -103,4 +103,4 @@ def _back(track: Track, settled: float, step: float) -> float:
 
 def begun(track: Track) -> int:
     """How often a flag went up."""
-    return int(np.sum(np.diff(track.told.astype(int), prepend=0) > 0))
+    return int(np.sum(np.diff(track.warned.astype(int), prepend=0) > 0))

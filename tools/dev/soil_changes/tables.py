@@ -45,7 +45,7 @@ def _line(name: str, group: Sequence[FollowedCase]) -> str:
     back = np.array([v.back for v in group])
     return (
         f"{name:18}{len(group):6}{sum(v.beyond for v in group) / total:11.2%}"
-        f"{sum(v.far for v in group) / total:11.2%}{sum(v.told for v in group) / total:9.1%}"
+        f"{sum(v.far for v in group) / total:11.2%}{sum(v.warned for v in group) / total:9.1%}"
         f"{np.mean(back <= BACK):12.0%}{np.median(back):7.1f} s"
         f"{np.quantile(back, 0.9, method='nearest'):6.1f} s{np.mean([v.nees for v in group]):7.2f}"
     )
@@ -63,7 +63,7 @@ def quiet(tracks: Sequence[Track]) -> str:
     """False flags and honesty of runs without a change."""
     hours = len(tracks) * UNCHANGED / 3600.0
     flags = [begun(track) for track in tracks]
-    beyond = np.concatenate([(track.away > 3.0) & ~track.told for track in tracks])
+    beyond = np.concatenate([(track.away > 3.0) & ~track.warned for track in tracks])
     within = np.concatenate([track.away <= 2.0 for track in tracks])
     nees = [track.nees[-1] for track in tracks]
     sigma_c, sigma_t = np.median([track.sigma[-1] for track in tracks], axis=0)

@@ -115,16 +115,16 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Simulated:
-    """A campaign: runs, effects that the diagnosis is not told of, and edits of two configurations.
+    """A campaign: runs, effects that the diagnosis does not know, and edits of two configurations.
 
-    world: that of the testbed as it is; told: the one that is handed to the diagnosis.
+    world: that of the testbed as it is; configured: the one that is handed to the diagnosis.
     """
 
     name: str
     runs: tuple[PlannedRun, ...]
     effects: tuple[str, ...] = ()
     world: Edits = ()
-    told: Edits = ()
+    configured: Edits = ()
     wrench: bool = True
     linearised: bool = True
 
@@ -201,7 +201,11 @@ SIMULATED = (
         ("pulley_slip.share=0.05",),
     ),
     Simulated(
-        "single-load", (PlannedRun(70.0, CREEPING),), world=NOISY_VOLTS, told=WIDE, wrench=False
+        "single-load",
+        (PlannedRun(70.0, CREEPING),),
+        world=NOISY_VOLTS,
+        configured=WIDE,
+        wrench=False,
     ),
     Simulated("replicates-unlisted", (*REPLICATES, PlannedRun(90.0, SWEPT)), UNLISTED),
     Simulated("between-runs", BETWEEN),

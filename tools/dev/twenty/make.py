@@ -48,8 +48,8 @@ def _simulate(folder: Path, campaign: Simulated, number: int, gritd: Path) -> No
     truth.mkdir()
     world = truth / "world.yaml"
     world.write_text(_configuration(campaign, campaign.world), encoding="utf-8")
-    told = _configuration(campaign, campaign.told)
-    (folder / "testbed.yaml").write_text(told, encoding="utf-8")
+    configured = _configuration(campaign, campaign.configured)
+    (folder / "testbed.yaml").write_text(configured, encoding="utf-8")
 
     soil = _soil(number)
     for n, run in enumerate(campaign.runs, start=1):

@@ -56,7 +56,7 @@ def _rest(
 ) -> Array:
     """What no direction holds, of one channel: (N, t) of all values of all runs."""
     inside, features = correction.inside(conditions), correction.features(conditions)
-    known = correction.told(inside, np.sum(features**2, axis=1))
+    known = correction.learnt(inside, np.sum(features**2, axis=1))
     learnt = rest * inside[:, None] * features
 
     open_ = np.sqrt(1.0 - known)

@@ -178,18 +178,18 @@ def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list
 
 def info_of(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
     """What the columns say of the run, then the map."""
-    told = {stem(key): info for key, info in mapped.runs.items()}.get(name, RunInfo())
-    load = told.nominal_load or _constant(table, mapped, "nominal_load") or mapped.load
+    stated = {stem(key): info for key, info in mapped.runs.items()}.get(name, RunInfo())
+    load = stated.nominal_load or _constant(table, mapped, "nominal_load") or mapped.load
     start, number = (_constant(table, mapped, key) for key in ("start", "pass"))
 
     return replace(
-        told,
+        stated,
         name=name,
         nominal_load=load,
-        start_position=told.start_position if start is None else start,
-        pass_number=told.pass_number if number is None else round(number),
-        operator=told.operator or mapped.operator,
-        notes=told.notes or mapped.notes,
+        start_position=stated.start_position if start is None else start,
+        pass_number=stated.pass_number if number is None else round(number),
+        operator=stated.operator or mapped.operator,
+        notes=stated.notes or mapped.notes,
     )
 
 
@@ -204,9 +204,9 @@ def _constant(table: SeriesTable, mapped: SeriesMap, channel: str) -> float | No
     values = table.column(name).numbers
     known = values[np.isfinite(values)]
     if not known.size or np.ptp(known) > 0.0:
-        told = f"{known.min():g} to {known.max():g}" if known.size else "no number"
+        shown = f"{known.min():g} to {known.max():g}" if known.size else "no number"
         raise RigFileError(
-            f"{table.path}: {name}: found {told}; expected one {channel} for the whole run"
+            f"{table.path}: {name}: found {shown}; expected one {channel} for the whole run"
         )
     return float(known[0]) * mapped.columns[name].per_unit
 

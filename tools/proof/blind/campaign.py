@@ -47,8 +47,8 @@ class BlindRun:
 
 
 @dataclass(frozen=True)
-class Habits:
-    """What the engineer does and does not do. None lets chance decide."""
+class Design:
+    """The design of a campaign: what the engineer does. None lets chance decide."""
 
     runs: int | None = None
     loads: int | None = None
@@ -61,9 +61,9 @@ class Habits:
     weighed: bool = False  # runs do not state their load, the wrench tells it
 
 
-def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habits:
-    """Habits by chance where they are not fixed."""
-    fixed = fixed or Habits()
+def design_drawn(rng: np.random.Generator, fixed: Design | None = None) -> Design:
+    """A design by chance where it is not fixed."""
+    fixed = fixed or Design()
     runs = int(rng.choice((1, 2, 3, 4, 5, 6), p=(0.1, 0.1, 0.25, 0.25, 0.15, 0.15)))
 
     drawn = {
@@ -80,26 +80,26 @@ def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habit
         name: value for name, value in drawn.items() if getattr(fixed, name) is None
     }
 
-    habits = replace(fixed, **chosen)
+    design = replace(fixed, **chosen)
     return replace(
-        habits, lifted=bool(habits.lifted and habits.wrench)
+        design, lifted=bool(design.lifted and design.wrench)
     )  # nothing else tells that the load is off
 
 
 def campaign(
-    rig: TrueRig, ground: PlantSoil, habits: Habits, rng: np.random.Generator
+    rig: TrueRig, ground: PlantSoil, design: Design, rng: np.random.Generator
 ) -> tuple[BlindRun, ...]:
     """Runs over soil that was prepared anew, but for second passes."""
-    count = habits.runs or 1
-    weights = _weights(rig, ground, min(count, habits.loads or 4), rng)
+    count = design.runs or 1
+    weights = _weights(rig, ground, min(count, design.loads or 4), rng)
     runs: list[BlindRun] = []
     begins = 0.0
 
     for number in range(count):
-        again = bool(habits.second_pass) and number > 0 and rng.random() < 0.5
+        again = bool(design.second_pass) and number > 0 and rng.random() < 0.5
         weight = runs[-1].weight if again else weights[number % len(weights)]
 
-        run = _run(rig, habits, weight, rng)
+        run = _run(rig, design, weight, rng)
         passes, start = (runs[-1].passes + 1, runs[-1].start) if again else (1, _start(rng))
         runs.append(replace(run, passes=passes, start=start, begins=begins))
 
@@ -125,19 +125,19 @@ def _weights(rig: TrueRig, ground: PlantSoil, count: int, rng: np.random.Generat
     return [rounded[place] for place in rng.permutation(count)]
 
 
-def _run(rig: TrueRig, habits: Habits, weight: float, rng: np.random.Generator) -> BlindRun:
+def _run(rig: TrueRig, design: Design, weight: float, rng: np.random.Generator) -> BlindRun:
     usual = float(rng.uniform(0.015, 0.04))
     slips = rng.permutation(np.linspace(*SLIPS, int(rng.integers(4, 7)))) + rng.uniform(-0.02, 0.02)
-    stretches = [_stretch(weight, float(slip), usual, habits, rng) for slip in slips]
+    stretches = [_stretch(weight, float(slip), usual, design, rng) for slip in slips]
 
-    if habits.reversal:
+    if design.reversal:
         stretches[-2:] = [
             replace(stretches[-2], duration=3.0),
             replace(stretches[-1], speed=-usual),
         ]
-    if habits.lifted:
+    if design.lifted:
         stretches.append(DrivenStretch(4.0, 0.0, 0.0, usual))
-    if habits.standstill:
+    if design.standstill:
         stretches.insert(0, DrivenStretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
 
     ramp = float(rng.uniform(*RAMP))
@@ -145,9 +145,9 @@ def _run(rig: TrueRig, habits: Habits, weight: float, rng: np.random.Generator) 
 
 
 def _stretch(
-    weight: float, slip: float, usual: float, habits: Habits, rng: np.random.Generator
+    weight: float, slip: float, usual: float, design: Design, rng: np.random.Generator
 ) -> DrivenStretch:
-    speed = usual * float(rng.choice((0.4, 0.7, 1.0, 1.6))) if habits.speeds else usual
+    speed = usual * float(rng.choice((0.4, 0.7, 1.0, 1.6))) if design.speeds else usual
     return DrivenStretch(float(rng.uniform(4.0, 6.0)), weight, round(slip, 3), round(speed, 4))
 
 

@@ -47,7 +47,7 @@ class BlindCase:
     seed: int
     assignment: Assignment
     family: str
-    habits: campaign.Habits
+    design: campaign.Design
     trial: BlindTrial  # its world holds the concealed effects
     reference: BlindTrial | None  # the campaign before, without them
     noise_factor: float  # stated noise over true
@@ -83,12 +83,12 @@ class BlindCase:
             "concealed": [
                 _described(effect) | {"coinciding": effect.coinciding()} for effect in self.effects
             ],
-            "world_habits": [_described(effect) for effect in world.habits],
+            "world_habits": [_described(effect) for effect in world.baseline],
             "world_bed": {"form": type(world.bed).__name__, **vars(world.bed)},
             "soil_family": self.family,
             "soil": _soil(self.trial),
             "reference_soil": None if before is None else _soil(before),
-            "habits": asdict(self.habits),
+            "habits": asdict(self.design),
             "noise_factor": self.noise_factor,
             "runs": [asdict(run) for run in self.trial.runs],
             "reference_runs": [asdict(run) for run in before.runs] if before else [],
@@ -127,8 +127,8 @@ def drawn(number: int, seed: int, assignment: Assignment) -> BlindCase:
 def _attempt(
     number: int, seed: int, assignment: Assignment, wanted: float, rng: np.random.Generator
 ) -> BlindCase:
-    habits = campaign.habits_drawn(rng, _fixed(assignment))
-    family, trial, reference = _trials(habits, assignment, rng)
+    design = campaign.design_drawn(rng, _fixed(assignment))
+    family, trial, reference = _trials(design, assignment, rng)
     detector = Detector(trial)
     facts = detector.facts()
 
@@ -145,7 +145,7 @@ def _attempt(
         seed=seed,
         assignment=assignment,
         family=family,
-        habits=habits,
+        design=design,
         trial=replace(trial, world=trial.world.with_effects(*effects)),
         reference=reference,
         noise_factor=TALL if assignment.noise == "tall" else noise_factor(not effects, rng),
@@ -156,22 +156,22 @@ def _attempt(
     )
 
 
-def _fixed(assignment: Assignment) -> campaign.Habits:
+def _fixed(assignment: Assignment) -> campaign.Design:
     fixed: dict[str, Any] = dict(assignment.without)
     for name in assignment.effects:
         fixed = NEEDED.get(name, {}) | fixed
-    return campaign.Habits(**fixed)
+    return campaign.Design(**fixed)
 
 
 def _trials(
-    habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
+    design: campaign.Design, assignment: Assignment, rng: np.random.Generator
 ) -> tuple[str, BlindTrial, BlindTrial | None]:
     """Soil family, the campaign, and the reference campaign before it, if any."""
-    family, trial = _trial(habits, assignment, rng)
+    family, trial = _trial(design, assignment, rng)
     if not assignment.pair:
         return family, trial, None
 
-    runs = _runs(trial.world.rig, trial.world.ground, habits, rng)
+    runs = _runs(trial.world.rig, trial.world.ground, design, rng)
     reference = replace(trial, runs=runs)
     if assignment.bed == "prepared":
         ground = knowledge.prepared(trial.world.ground, rng)
@@ -180,33 +180,33 @@ def _trials(
 
 
 def _trial(
-    habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
+    design: campaign.Design, assignment: Assignment, rng: np.random.Generator
 ) -> tuple[str, BlindTrial]:
     """Soil, rig, world, knowledge, sensors and campaign."""
     while True:
         family, ground = knowledge.ground_drawn(rng)
         rig = knowledge.rig_drawn(rng)
-        runs = campaign.campaign(rig, ground, habits, rng)
+        runs = campaign.campaign(rig, ground, design, rng)
         if _drivable(rig, ground, runs):
             break
 
     heaviest = max(run.weight for run in runs)
-    known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
+    known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(design.wrench), rng)
     rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
     bed, own = worlds.drawn(assignment.world, rng, worlds.Size(heaviest, rig.radius))
     chain = knowledge.chain_drawn(known, rng)
 
     if assignment.noise == "slow":
         chain = knowledge.slowed(chain)
-    return family, BlindTrial(World(rig, ground, bed=bed, habits=own), known, chain, runs)
+    return family, BlindTrial(World(rig, ground, bed=bed, baseline=own), known, chain, runs)
 
 
 def _runs(
-    rig: TrueRig, ground: PlantSoil, habits: campaign.Habits, rng: np.random.Generator
+    rig: TrueRig, ground: PlantSoil, design: campaign.Design, rng: np.random.Generator
 ) -> tuple[campaign.BlindRun, ...]:
     """Another campaign of the same rig."""
     while True:
-        runs = campaign.campaign(rig, ground, habits, rng)
+        runs = campaign.campaign(rig, ground, design, rng)
         if _drivable(rig, ground, runs):
             return runs
 

@@ -93,7 +93,7 @@ def _record(
 ) -> Path:
     run, trial = one.trial.runs[number], one.trial
     sent = readings(trial.chain, one.felt[number], trial.known.pulley, one.begins[number], rng)
-    load = None if case.habits.weighed else run.weight
+    load = None if case.design.weighed else run.weight
     folder.mkdir(exist_ok=True)
     path = folder / f"run-{number + 1}.mcap"
     _written(path, text, RunInfo(one.name(number), load, run.passes, run.start), sent)

@@ -47,7 +47,7 @@ class Assignment:
     stratum: str
     effects: tuple[str, ...] = ()
     level: str = ""  # of an awkward campaign: what is awkward
-    without: tuple[tuple[str, bool | int], ...] = ()  # habits that are fixed
+    without: tuple[tuple[str, bool | int], ...] = ()  # of the design, what is fixed
     world: str = PAPER
     bed: str = ""  # of BEDS where a reference campaign comes first; else there is none
     noise: str = ""  # "tall": 2.5 times what is stated; "slow": correlated 0.95 from 0.1 s to 0.1 s

@@ -69,7 +69,7 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
             finding = proof.run(bench := CommandBench(data.resolve(), Path(work), progress.at))
 
     seconds = time.monotonic() - began
-    _tell(proof, finding, seconds)
+    _print(proof, finding, seconds)
     figure.draw(folder / f"proof-{proof.name}.png", finding.panels)
 
     target = folder / PAGE
@@ -79,7 +79,7 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
     )
 
 
-def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
+def _print(proof: Proof, finding: Finding, seconds: float) -> None:
     print(
         f"{proof.title}: {sum(a.met for a in finding.checks)} of {len(finding.checks)} as wanted, "
         f"{seconds:.0f} s"

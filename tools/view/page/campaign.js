@@ -8,34 +8,34 @@ const FORCES = [["torque", "torque T [N·m]", "T", "N·m"], ["drawbar_pull", "dr
 const COLOURS = 6;
 
 export const campaign = async () => {
-  const told = await (await fetch("campaign")).json();
+  const answer = await (await fetch("campaign")).json();
   byId("campaign").hidden = false;
-  if (told.state === "computing") {
-    byId("campaign-told").textContent = "Computing the forces of all runs by both forms of the equations …";
+  if (answer.state === "computing") {
+    byId("campaign-caption").textContent = "Computing the forces of all runs by both forms of the equations …";
     setTimeout(() => campaign().catch(() => {}), 1500);
     return;
   }
-  document.body.dataset.campaign = told.state;
-  if (told.state === "failed") { byId("campaign-told").textContent = `No campaign: ${told.reason}`; return; }
+  document.body.dataset.campaign = answer.state;
+  if (answer.state === "failed") { byId("campaign-caption").textContent = `No campaign: ${answer.reason}`; return; }
 
-  byId("campaign-told").textContent = `Dots: windows of the runs, by load. Line: original equations (1) to (10); dashed: closed form (20) to (22); both with ` +
-    `the soil that all runs together know, c ${pair(told.soil.cohesion, 0)} Pa, tan φ ${pair(told.soil.tan_phi, 4)}.`;
-  const refused = told.runs.map((run, i) => (run.counts ? "" : `run ${i + 1} is not believed: ${run.reason}`)).filter(Boolean);
+  byId("campaign-caption").textContent = `Dots: windows of the runs, by load. Line: original equations (1) to (10); dashed: closed form (20) to (22); both with ` +
+    `the soil that all runs together know, c ${pair(answer.soil.cohesion, 0)} Pa, tan φ ${pair(answer.soil.tan_phi, 4)}.`;
+  const refused = answer.runs.map((run, i) => (run.counts ? "" : `run ${i + 1} is not believed: ${run.reason}`)).filter(Boolean);
   byId("refused").replaceChildren(...refused.map(words => made("li", `Left out, ${words}.`)));
   const into = byId("forces");
-  into.replaceChildren(...FORCES.map(force => drawn(told, ...force)).filter(Boolean), estimates(told, "cohesion", "cohesion c [Pa]", 0),
-    estimates(told, "tan_phi", "tan φ", 4));
+  into.replaceChildren(...FORCES.map(force => drawn(answer, ...force)).filter(Boolean), estimates(answer, "cohesion", "cohesion c [Pa]", 0),
+    estimates(answer, "tan_phi", "tan φ", 4));
 };
 
 const pair = (known, decimals) => `${written(known.value, decimals)} ± ${written(known.sigma, decimals)}`;
 
-const drawn = (told, name, label, symbol, unit) => {
-  const parts = told.runs.flatMap(run => run.loads.map(load => ({...load, run: run.name, of: load[name]})))
+const drawn = (answer, name, label, symbol, unit) => {
+  const parts = answer.runs.flatMap(run => run.loads.map(load => ({...load, run: run.name, of: load[name]})))
     .filter(part => part.of.measured.some(v => v !== null));
   if (parts.length === 0) return null;
 
   const loads = [...new Set(parts.map(part => Math.round(part.load)))].sort((a, b) => a - b);
-  const groups = grouped(loads), tones = toned(told.runs, groups);
+  const groups = grouped(loads), tones = toned(answer.runs, groups);
   const slips = parts.flatMap(part => part.slip.map(v => 100 * v));
   const forces = parts.flatMap(part => [...part.of.measured, ...part.of.original.value, ...part.of.closed.value]).filter(v => v !== null);
   const {figure, svg, X, Y, words} = axes(span(slips), span(forces), label, "slip [%]");
@@ -79,16 +79,16 @@ const toned = (runs, groups) => {
     [group, (single ? driven.findIndex(own => own.includes(group)) : group) % COLOURS + 1]));
 };
 
-const estimates = (told, name, label, decimals) => {
+const estimates = (answer, name, label, decimals) => {
   // A run that is not believed does not set the scale: its σ may be larger than all others together.
-  const believed = told.runs.filter(run => run.counts), of = believed.length ? believed : told.runs;
-  const edges = [...of.map(run => run.alone), ...told.runs.map(run => run.together)].flatMap(soil => {
+  const believed = answer.runs.filter(run => run.counts), of = believed.length ? believed : answer.runs;
+  const edges = [...of.map(run => run.alone), ...answer.runs.map(run => run.together)].flatMap(soil => {
     const {value, sigma} = soil[name];
     return [value - 2 * sigma, value + 2 * sigma];
   });
-  const {figure, svg, Y, words} = axes([0.4, told.runs.length + 0.6], span(edges), label, "run", told.runs.map((run, i) => i + 1));
-  const X = v => BOX.left + (v - 0.4) / (told.runs.length + 0.2) * (BOX.right - BOX.left);
-  told.runs.forEach((run, i) => {
+  const {figure, svg, Y, words} = axes([0.4, answer.runs.length + 0.6], span(edges), label, "run", answer.runs.map((run, i) => i + 1));
+  const X = v => BOX.left + (v - 0.4) / (answer.runs.length + 0.2) * (BOX.right - BOX.left);
+  answer.runs.forEach((run, i) => {
     for (const [which, shift, kind] of [["alone", -0.1, "alone"], ["together", 0.1, "together"]]) {
       const {value, sigma} = run[which][name], x = X(i + 1 + shift), inside = y => Math.min(Math.max(y, BOX.top), BOX.bottom);
       picture(svg, "line", {class: `whisker ${kind}`, x1: x, x2: x, y1: inside(Y(value - 2 * sigma)), y2: inside(Y(value + 2 * sigma))});
@@ -97,8 +97,8 @@ const estimates = (told, name, label, decimals) => {
   });
   words("alone", BOX.right - 150, BOX.top - 10, "");
   words("with those before it", BOX.right, BOX.top - 10, "estimate-text");
-  const said = `${label} run by run within 2σ, in the order of the table: ` + told.runs.map((run, i) => `${i + 1} ${run.name}`).join(", ") +
-    `. All together ${pair(told.soil[name], decimals)}.`;
+  const said = `${label} run by run within 2σ, in the order of the table: ` + answer.runs.map((run, i) => `${i + 1} ${run.name}`).join(", ") +
+    `. All together ${pair(answer.soil[name], decimals)}.`;
   figure.appendChild(made("figcaption", said));
   svg.setAttribute("aria-label", said);
   return figure;

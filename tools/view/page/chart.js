@@ -72,7 +72,7 @@ export class Chart {
         drawAxes: [u => this.inside(u, line => this.marked(u, line))],
         draw: [u => this.inside(u, line => this.control.drawn(u, line))],
         setSelect: [u => this.zoomed(u)],
-        setCursor: [() => this.told()],
+        setCursor: [() => this.values()],
       },
     };
   }
@@ -123,11 +123,11 @@ export class Chart {
     this.curves = curves;
     const data = this.order().map(at => curves.columns[at] || []);
     this.plot.setData([curves.time, ...data], true);
-    this.told();
+    this.values();
   }
 
   // The value under the cursor, or the last one.
-  told() {
+  values() {
     if (!this.curves || !this.plot || this.runs) return;
     const at = this.plot.cursor.idx ?? this.control.index(this.curves.time);
     const words = this.of.curves.map(c => {

@@ -11,7 +11,7 @@ const RENEW = 900; // rows appended before the curves are asked for anew
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
 const page = {about: null, charts: [], curves: new Curves(), events: [], frame: null, prior: null,
-  window: WINDOWS[0], held: null, marks: -1, answered: 0, frames: 0, told: 0, drawn: 0, took: 0, labelled: 0};
+  window: WINDOWS[0], held: null, marks: -1, answered: 0, frames: 0, written: 0, drawn: 0, took: 0, labelled: 0};
 
 const span = () => page.held || [(page.curves.last || 0) - page.window, page.curves.last || 1];
 const utc = t => new Date(t * 1e3).toISOString().slice(11, 19);
@@ -100,8 +100,8 @@ const draw = () => {
   page.drawn = now;
   if (page.curves.time.length) page.charts.forEach(chart => chart.draw(page.curves));
   if (page.frame) {
-    plane(byId("plane"), byId("plane-told"), page.frame.ellipse, page.curves.way, page.prior);
-    wheel(byId("wheel"), byId("wheel-told"), page.frame.rim);
+    plane(byId("plane"), byId("plane-caption"), page.frame.ellipse, page.curves.way, page.prior);
+    wheel(byId("wheel"), byId("wheel-caption"), page.frame.rim);
   }
   const [from, to] = span();
   page.took = performance.now() - now;
@@ -115,8 +115,8 @@ const label = () => {
 
 const tell = () => {
   const frame = page.frame, now = performance.now();
-  if (now - page.told < TEXT) return;
-  page.told = now;
+  if (now - page.written < TEXT) return;
+  page.written = now;
   byId("about").textContent = `gritd · ${frame.about}`;
   document.title = `${frame.headline.title} – gritd`;
   document.body.dataset.sequence = frame.sequence;
@@ -155,7 +155,7 @@ const silent = () => {
 
 const follow = () => {
   const source = new EventSource("live");
-  source.addEventListener("open", () => { page.told = 0; quietly(renew()); });
+  source.addEventListener("open", () => { page.written = 0; quietly(renew()); });
   source.addEventListener("message", event => taken(JSON.parse(event.data)));
   source.addEventListener("error", () => {
     silent();

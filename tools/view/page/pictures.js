@@ -34,9 +34,9 @@ const inset = (svg, ranges, outline, stated, below) => {
   picture(svg, "path", {class: "ellipse", d: at(outline) + "Z"});
 };
 
-export const plane = (svg, told, ellipse, way, prior) => {
+export const plane = (svg, caption, ellipse, way, prior) => {
   svg.replaceChildren();
-  if (!ellipse) { told.textContent = "No estimate yet."; svg.setAttribute("aria-label", told.textContent); return; }
+  if (!ellipse) { caption.textContent = "No estimate yet."; svg.setAttribute("aria-label", caption.textContent); return; }
 
   const turn = Array.from({length: 73}, (_, i) => i / 72 * 2 * Math.PI);
   const outline = turn.map(a => [ellipse.c + ellipse.ax * Math.cos(a), ellipse.tan_phi + ellipse.ay * Math.cos(a) + ellipse.by * Math.sin(a)]);
@@ -73,7 +73,7 @@ export const plane = (svg, told, ellipse, way, prior) => {
   const words = `Filled: the estimate within 2σ, c ${written(ellipse.c, 0)} ± ${written(ellipse.ax / 2, 0)} Pa, tan φ ` +
     `${written(ellipse.tan_phi, 4)} ± ${written(Math.hypot(ellipse.ay, ellipse.by) / 2, 4)}. Line: its path in this window.` +
     (known ? ` Dashed${wide ? ", in the small picture at its own scale" : ""}: the stated prior, c ${written(known[0][0], 0)} ± ${written(known[0][1], 0)} Pa, tan φ ${written(known[1][0], 3)} ± ${written(known[1][1], 3)}.` : "");
-  told.textContent = words;
+  caption.textContent = words;
   svg.setAttribute("aria-label", words);
 };
 
@@ -97,9 +97,9 @@ const number = v => `${+v.toPrecision(6)}`.replace("-", "−");
 const GROUND = 196, MIDDLE = 240, SIZE = 150; // [px] the undisturbed surface, the axle, the radius
 const STRESS = 74; // [px] of the greatest stress
 
-export const wheel = (svg, told, rim) => {
+export const wheel = (svg, caption, rim) => {
   svg.replaceChildren();
-  if (!rim) { told.textContent = "The wheel does not stand in soil, or is not known."; svg.setAttribute("aria-label", told.textContent); return; }
+  if (!rim) { caption.textContent = "The wheel does not stand in soil, or is not known."; svg.setAttribute("aria-label", caption.textContent); return; }
 
   const entry = rim.theta[0], depth = SIZE * (1 - Math.cos(entry)), bottom = GROUND + depth, axle = bottom - SIZE;
   const on = (theta, r) => [MIDDLE + r * Math.sin(theta), axle + r * Math.cos(theta)];
@@ -132,6 +132,6 @@ export const wheel = (svg, told, rim) => {
   const said = `Wheel of radius ${written(rim.radius * 1e3, 0)} mm, in contact from θ₁ ${degrees(entry)} to the bottom. Outwards from the rim, ` +
     `by the linear model at the estimate: normal stress σ (filled), up to ${written(most, 1)} kPa at θₘ ${degrees(rim.theta[peak])}, ` +
     `and shear stress τ (line), up to ${written(shear, 1)} kPa at ${degrees(rim.theta[greatest])}.`;
-  told.textContent = said;
+  caption.textContent = said;
   svg.setAttribute("aria-label", `${said} Sinkage ${written(rim.sinkage * 1e3, 1)} mm.`);
 };

@@ -10,7 +10,7 @@ const MANY = 8; // runs, from which on they can be searched
 const EVERY = 100; // [ms] between moments that are asked for while it plays
 
 const page = {about: null, charts: [], runs: [], active: 0, along: "time", span: null, at: 0, playing: false, speed: 1,
-  events: [], asking: false, wanted: false, before: 0, curves: null, told: null, round: 0, order: {by: "", down: false}};
+  events: [], asking: false, wanted: false, before: 0, curves: null, moment: null, round: 0, order: {by: "", down: false}};
 
 const shown = () => page.runs.filter(run => run.shown);
 const active = () => page.runs[page.active];
@@ -65,12 +65,12 @@ const moment = async () => {
   if (page.asking) { page.wanted = true; return; }
   page.asking = true;
   try {
-    const told = await (await fetch(`moment?run=${page.active}&along=${page.along}&at=${page.at}`)).json();
-    page.told = told;
-    headline(told.headline);
-    values(told.values);
-    facts("trust", told.trust);
-    document.body.dataset.sequence = told.sequence;
+    const answer = await (await fetch(`moment?run=${page.active}&along=${page.along}&at=${page.at}`)).json();
+    page.moment = answer;
+    headline(answer.headline);
+    values(answer.values);
+    facts("trust", answer.trust);
+    document.body.dataset.sequence = answer.sequence;
     pictures();
   } finally {
     page.asking = false;
@@ -80,8 +80,8 @@ const moment = async () => {
 
 const pictures = () => {
   const way = active().curves ? active().curves.way : {c: [], tanPhi: []};
-  plane(byId("plane"), byId("plane-told"), page.told.ellipse, way, active().prior);
-  wheel(byId("wheel"), byId("wheel-told"), page.told.rim);
+  plane(byId("plane"), byId("plane-caption"), page.moment.ellipse, way, active().prior);
+  wheel(byId("wheel"), byId("wheel-caption"), page.moment.rim);
 };
 
 const moved = place => {
@@ -90,7 +90,7 @@ const moved = place => {
   byId("scrub").value = 1000 * page.at / (last || 1);
   byId("scrub").setAttribute("aria-valuetext", words(page.at));
   byId("at").textContent = `${words(page.at)} of ${words(last)}`;
-  page.charts.forEach(chart => { chart.plot.redraw(false); chart.told(); });
+  page.charts.forEach(chart => { chart.plot.redraw(false); chart.values(); });
   quietly(moment());
 };
 
@@ -232,10 +232,10 @@ const differed = async () => {
 
 // What was read of the files so far; asked again until it is all.
 const reading = async about => {
-  const left = about.runs.filter(run => !run.whole).length, told = about.runs.flatMap(run => run.damage.map(line => `${run.name}: ${line}`));
-  byId("reading").hidden = !about.busy && told.length === 0;
+  const left = about.runs.filter(run => !run.whole).length, damage = about.runs.flatMap(run => run.damage.map(line => `${run.name}: ${line}`));
+  byId("reading").hidden = !about.busy && damage.length === 0;
   byId("reading").textContent = about.busy
-    ? `A first look: ${about.runs.length - left} of ${about.runs.length} recordings are read whole.` : `Damaged: ${told.join("; ")}`;
+    ? `A first look: ${about.runs.length - left} of ${about.runs.length} recordings are read whole.` : `Damaged: ${damage.join("; ")}`;
   document.body.dataset.whole = String(!about.busy);
   if (!about.busy) return;
   await new Promise(done => { setTimeout(done, 700); });

@@ -77,9 +77,9 @@ def tdms(path: Path) -> None:
     nptdms = import_module("nptdms")
     with nptdms.TdmsWriter(path) as writer:
         for group, columns, step in (("drive", DRIVE, 0.01), ("cell", CELL, 0.02)):
-            told = {"wf_increment": step, "wf_start_time": np.datetime64(START, "ns")}
+            reported = {"wf_increment": step, "wf_start_time": np.datetime64(START, "ns")}
             channels = [
-                nptdms.ChannelObject(group, name, values, told)
+                nptdms.ChannelObject(group, name, values, reported)
                 for name, values in columns.items()
                 if name != "t"
             ]
@@ -181,8 +181,8 @@ def _messages(store: Any, first: bool) -> Iterator[tuple[str, str, int, Any]]:
 
     for at, seconds in enumerate(TIME.tolist()):
         stamp = START + round(seconds * 1e9)
-        told = (time(stamp // 10**9, stamp % 10**9), "base")
-        head = header(at, *told) if first else header(*told)
+        reported = (time(stamp // 10**9, stamp % 10**9), "base")
+        head = header(at, *reported) if first else header(*reported)
         state = made["bench_msgs/msg/WheelState"](
             head,
             made["bench_msgs/msg/Drive"](WHEEL[at], "slip" * (at % 3)),

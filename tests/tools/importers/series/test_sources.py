@@ -153,9 +153,9 @@ def test_every_group_of_a_file_is_offered(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["csv", str(grouped(tmp_path)), "--guess"]) == 0
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     for name in ("roll.time", "roll.speed", "roll.effort", "yaw.time", "yaw.position"):
-        assert name in told
+        assert name in reported
 
 
 def test_groups_of_several_lengths_are_one_run(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ load: 50 N
     assert len(recording.arrays("/raw/wheel_encoder")) == 500
     assert len(recording.arrays("/raw/carriage_encoder")) == 510
 
-    for wrong, told in (
+    for wrong, reported in (
         ("# none", "found no time for 'yaw.position'"),
         ("time: {channel: time, unit: s}", "roll.time, yaw.time"),
         ("yaw.tim: {channel: time, unit: s}", "did you mean yaw.time?"),
@@ -184,7 +184,7 @@ load: 50 N
         map_file.write_text(text.replace("YAW", wrong))
         with pytest.raises(CommandError) as error:
             main(command)
-        assert told in str(error.value) and len(str(error.value)) < 300
+        assert reported in str(error.value) and len(str(error.value)) < 300
 
 
 @pytest.mark.parametrize(

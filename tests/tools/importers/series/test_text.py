@@ -202,11 +202,11 @@ LEFT_OUT = {
 
 @pytest.mark.parametrize("kind", LEFT_OUT)
 def test_what_is_no_whole_row_is_left_out_and_told(tmp_path: Path, kind: str) -> None:
-    content, gone, told = LEFT_OUT[kind]
+    content, gone, reported = LEFT_OUT[kind]
     found = table(tmp_path, content)
     check(found, gone)
     (note,) = found.notes
-    assert f"{told}:" in note and len(note) < 200
+    assert f"{reported}:" in note and len(note) < 200
 
 
 def test_a_gap_is_a_gap(tmp_path: Path) -> None:
@@ -247,11 +247,11 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_what_cannot_be_read_is_one_line(tmp_path: Path, kind: str) -> None:
-    content, told = REFUSED[kind]
+    content, reported = REFUSED[kind]
     with pytest.raises(CommandError) as error:
         table(tmp_path, content)
     said = str(error.value)
-    assert told in said and said.startswith(f"{tmp_path / 'run.csv'}: ")
+    assert reported in said and said.startswith(f"{tmp_path / 'run.csv'}: ")
     assert "\n" not in said and len(said) - len(str(tmp_path)) < 300
 
 

@@ -44,9 +44,9 @@ def stretches(folder: Path) -> Iterator[Steady]:
     paper = responses([(World(RIG, GROUND), motion) for motion in motions])
 
     for run, known in enumerate(recorded):
-        told = np.stack((known["z"], -known["T"], known["DP"]))
+        reported = np.stack((known["z"], -known["T"], known["DP"]))
         for slip, inside in _steady(known):
-            means = tuple(told[:, inside].mean(axis=1).tolist())
+            means = tuple(reported[:, inside].mean(axis=1).tolist())
             yield Steady(
                 WEIGHTS[run], slip, means, _means(strips[run], inside), _means(paper[run], inside)
             )

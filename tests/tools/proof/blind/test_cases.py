@@ -126,14 +126,14 @@ def test_an_offset_within_its_calibration_is_invisible(null: cases.BlindCase) ->
 def test_standstill_tells_friction_from_offset() -> None:
     rng, left = np.random.default_rng(0), {}
     for standstill in (False, True):
-        habits = (
+        design = (
             ("standstill", standstill),
             ("lifted", False),
             ("reversal", False),
             ("runs", 3),
             ("loads", 3),
         )
-        trial = cases.drawn(1, 3, Assignment("none", without=habits)).trial
+        trial = cases.drawn(1, 3, Assignment("none", without=design)).trial
         detector = Detector(trial)
         effect, found = detect.strengthened(
             detector, BristleFriction(2.0 * detector.facts().torque), 60.0
@@ -153,10 +153,10 @@ def handed_over(case: cases.BlindCase, folder: Path) -> list[Path]:
 def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.BlindCase, tmp_path: Path) -> None:
     files = handed_over(null, tmp_path / "given")
     loaded = config.load(tmp_path / "given" / handover.CONFIGURATION)
-    true, told = null.trial.world.ground, loaded.settings.soil
+    true, reported = null.trial.world.ground, loaded.settings.soil
 
-    assert told.cohesion.value != true.cohesion
-    assert abs(told.cohesion.value - float(true.cohesion)) < 3.0 * told.cohesion.sigma
+    assert reported.cohesion.value != true.cohesion
+    assert abs(reported.cohesion.value - float(true.cohesion)) < 3.0 * reported.cohesion.sigma
 
     at_rest = read(files[0]).arrays("/raw/motor_shunt")["volts"][:200].mean()
     shunt = loaded.settings.channels["motor_shunt"].calibration

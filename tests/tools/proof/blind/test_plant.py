@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.stages.situation import Motion as ToldMotion
+from gritd.estimator.stages.situation import Motion as EncoderMotion
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
 from gritd.tools.proof.blind.plant.concealed.friction import lugre, maxwell
@@ -84,12 +84,12 @@ def test_without_effects_it_is_the_papers_wheel() -> None:
     """
     felt = drive(WORLD, run(passes=1))
     m = felt.scene.motion
-    told = ToldMotion(m.time, m.turn, m.omega, m.travel, m.speed, felt.load)
+    reported = EncoderMotion(m.time, m.turn, m.omega, m.travel, m.speed, felt.load)
     soil = Soil(
         GROUND.cohesion, GROUND.tan_phi, GROUND.shear_modulus, GROUND.exponent, GROUND.modulus
     )
     known = simulate_arrays(
-        Wheel(RIG.radius, RIG.width), soil, told, (), torque_constant=2.0
+        Wheel(RIG.radius, RIG.width), soil, reported, (), torque_constant=2.0
     ).sensed
     steady = (np.abs(np.gradient(m.omega, m.step)) < 1e-4) & (np.abs(m.omega) > 0.1)
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gritd.tools.proof.blind.plant import worlds
+from gritd.tools.proof.blind.plant.baseline import LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
 from gritd.tools.proof.blind.plant.effect import PlantEffect
-from gritd.tools.proof.blind.plant.habits import LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.respond import World, drive, respond, responses
 from gritd.tools.proof.blind.plant.scene import Felt
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, HELD, WORLDS, Size
@@ -23,7 +23,7 @@ FORMS = [form for forms in (LISTED | UNLISTED).values() for form in forms]
 
 def world(name: str, seed: int = 1) -> World:
     bed, own = worlds.drawn(name, np.random.default_rng(seed), Size(65.0, RIG.radius))
-    return World(RIG, GROUND, bed=bed, habits=own)
+    return World(RIG, GROUND, bed=bed, baseline=own)
 
 
 def test_what_worlds_hold_are_names_of_effects() -> None:
@@ -67,11 +67,11 @@ def test_more_slip_asks_for_more_torque_and_pulls_harder(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "habit", [Relaxation(0.0), WornGear(0.0, 0.0, 0.0), LeakingSensor(0.0)], ids=lambda h: str(h)
+    "effect", [Relaxation(0.0), WornGear(0.0, 0.0, 0.0), LeakingSensor(0.0)], ids=lambda h: str(h)
 )
-def test_a_habit_is_off_at_zero(habit: PlantEffect) -> None:
+def test_a_baseline_effect_is_off_at_zero(effect: PlantEffect) -> None:
     plain = drive(World(RIG, GROUND), run())
-    off = respond(World(RIG, GROUND, habits=(habit,)), plain.scene.motion)
+    off = respond(World(RIG, GROUND, baseline=(effect,)), plain.scene.motion)
     for channel in READ:
         np.testing.assert_allclose(
             getattr(off, channel), getattr(plain, channel), rtol=1e-9, atol=1e-9
@@ -120,7 +120,7 @@ def test_the_relaxation_follows_over_its_length_of_travel() -> None:
         run(), time=time, omega=0.3 * ones, speed=0.3 * RIG.radius * (1.0 - slip),
         weight=65.0 * ones, passes=1,
     )  # fmt: skip
-    felt = drive(World(RIG, GROUND, habits=(Relaxation(0.02),)), orders)
+    felt = drive(World(RIG, GROUND, baseline=(Relaxation(0.02),)), orders)
     since = felt.scene.motion.travel - np.interp(15.0, time, felt.scene.motion.travel)
     before, after = felt.torque[time < 14.9][-1], felt.torque[-1]
     risen = (felt.torque - before) / (after - before)

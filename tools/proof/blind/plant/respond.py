@@ -27,11 +27,11 @@ class World:
     ground: PlantSoil
     effects: tuple[PlantEffect, ...] = ()  # concealed
     bed: BedForm = field(default_factory=EquationBed)
-    habits: tuple[PlantEffect, ...] = ()  # of the world itself: there in every campaign of it
+    baseline: tuple[PlantEffect, ...] = ()  # of the world itself: there in every campaign of it
 
     @property
     def acting(self) -> tuple[PlantEffect, ...]:
-        return (*self.habits, *self.effects)
+        return (*self.baseline, *self.effects)
 
     def with_effects(self, *effects: PlantEffect) -> World:
         """The same rig, bed and soil with these effects concealed."""
@@ -75,7 +75,7 @@ def responses(
     worlds = [asked[place][0] for place in fresh]
     carried = _carry(worlds, [scenes[place] for place in fresh], damped)
     for place, scene in zip(fresh, carried, strict=True):
-        scenes[place] = _forced(asked[place][0].habits, scene)
+        scenes[place] = _forced(asked[place][0].baseline, scene)
 
     done = [_forced(world.effects, scene) for (world, _), scene in zip(asked, scenes, strict=True)]
     return [_sensed(world, scene) for (world, _), scene in zip(asked, done, strict=True)]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gritd.tools.proof.blind.plant.baseline import BottomPeak, LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.bed import BedForm, EquationBed
 from gritd.tools.proof.blind.plant.effect import PlantEffect
-from gritd.tools.proof.blind.plant.habits import BottomPeak, LeakingSensor, Relaxation, WornGear
 from gritd.tools.proof.blind.plant.strips import StripBed
 
 PAPER = "paper"
@@ -35,12 +35,12 @@ FOREIGN = WORLDS[1:]
 
 # A rut that stays is a second pass of its own: what it adds is no effect beside it.
 BARRED: dict[str, tuple[str, ...]] = {"strips": ("multipass",)}
-MILD = 0.6  # of the usual size, where several habits come together
+MILD = 0.6  # of the usual size, where several effects come together
 
 
 @dataclass(frozen=True)
 class Size:
-    """What habits are measured by."""
+    """What the sizes of baseline effects are shares of."""
 
     weight: float  # [N]
     radius: float  # [m]
@@ -60,13 +60,13 @@ def concealable(world: str, names: tuple[str, ...]) -> list[str]:
 def drawn(
     world: str, rng: np.random.Generator, size: Size
 ) -> tuple[BedForm, tuple[PlantEffect, ...]]:
-    """The bed and the habits of a world; sizes by chance."""
+    """The bed and the baseline effects of a world; sizes by chance."""
     if world == "strips":
         return StripBed(recovery=float(rng.uniform(0.02, 0.1))), ()
-    return EquationBed(), _habits(world, rng, size)
+    return EquationBed(), _baseline(world, rng, size)
 
 
-def _habits(world: str, rng: np.random.Generator, size: Size) -> tuple[PlantEffect, ...]:
+def _baseline(world: str, rng: np.random.Generator, size: Size) -> tuple[PlantEffect, ...]:
     if world == "bottom":
         return (_bottom(rng),)
     if world == "relaxation":

@@ -268,12 +268,12 @@ class DeviceClock:
             self._is_settled, self._off = True, 0
 
     def _stamped(self, times: list[int], received: int) -> dict[int, int]:
-        """The stamp of each time of a chunk: by the line for the newest, evenly between that and
-        the last stamp for those before, for the line may have moved: no sample may look like a
-        jump.
+        """The stamp of each time of a chunk, in the order sent: by the line for the newest, evenly
+        between that and the last stamp for those before, for the line may have moved: no sample may
+        look like a jump. One that is newer than those sent after it is wrong.
         """
         stamps = {time: min(time + self._line.at(time), received) for time in times}
-        newest, last = max(times), self._last
+        newest, last = max([times[-1], *sorted(times)[-2:-1]]), self._last
         if last is None:
             self._last = newest, stamps[newest]
             return stamps
@@ -285,5 +285,5 @@ class DeviceClock:
         return stamps | {
             time: last[1] + (end - last[1]) * (time - last[0]) // (newest - last[0])
             for time in times
-            if time >= last[0]
+            if last[0] <= time <= newest
         }

@@ -268,6 +268,18 @@ def test_a_stalled_host_does_not_move_the_stamps():
     assert clock.steps == 0 and clock.rejected == 0
 
 
+def test_a_wrong_stamp_among_frames_that_were_held_back_moves_no_other():
+    """The race of a 16-bit timer, 65.5 ms ahead, in a chunk that came 60 ms late."""
+    clock = DeviceClock()
+    for k in range(1000):
+        clock.stamps([device_us(k / 500)], EPOCH + int((k / 500 + 1e-4) * NS))
+    held = [2.0 + k / 500 for k in range(30)]
+    shown = [device_us(t + 65.536e-3 * (k == 2)) for k, t in enumerate(held)]
+    stamps = clock.stamps(shown, EPOCH + int(2.0601 * NS))
+    away = [abs((stamp - EPOCH) / NS - t) for stamp, t in zip(stamps, held, strict=True)]
+    assert max(away[:2] + away[3:]) < 1e-3
+
+
 def test_a_late_sample_is_stamped_by_its_own_time():
     clock = DeviceClock()
     steady(clock, 3)

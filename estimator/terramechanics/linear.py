@@ -221,21 +221,6 @@ def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scal
     return np.asarray(sigma_m * np.maximum(np.minimum(front, rear), 0.0))
 
 
-def triangular_shear_stress(
-    theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar
-) -> Array:
-    """Triangular τ (n,) [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom
-    dead centre.
-
-    The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g
-    with σ triangular.
-    """
-    front = tau_m * np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m)
-    rear = tau_0 + (tau_m - tau_0) * np.divide(theta, theta_m)
-
-    return np.where(np.greater(theta, theta_m), front, rear)
-
-
 def tau_m(
     wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, sigma_m: Value
 ) -> Value:

@@ -95,16 +95,6 @@ def front_stress(wheel: Wheel, soil: Soil, front: Arc) -> Array:
     return stress
 
 
-def rear_stress(
-    wheel: Wheel, soil: Soil, theta_1: Scalar, theta_m: Scalar, theta: Scalar, theta_2: Scalar = 0.0
-) -> Array:
-    """Normal stress σ [Pa] at θ (2·order, n) between θ₂ and θₘ, Eq. (4): the front zone's,
-    mirrored and stretched about θₘ.
-    """
-    mirrored = theta_1 - (theta - theta_2) * (theta_1 - theta_m) / (theta_m - theta_2)
-    return front_stress(wheel, soil, arc(theta_1, mirrored))
-
-
 def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
     """Shear displacement j (2·order, n) [m] of the soil, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ −
     sin θ)].

@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.tools.calibrate.line import CalibrationLine
 from gritd.tools.calibrate.outcome import CalibrationOutcome
-from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.cli.command import USAGE, CommandError, os_errors
 from gritd.tools.cli.optional import require
 
 if TYPE_CHECKING:
@@ -34,11 +34,8 @@ def draw(path: Path, outcome: CalibrationOutcome) -> None:
         _line(above, name, line)
         _residuals(below, line)
 
-        try:
+        with os_errors(path):
             save(figure, path)
-        except OSError as error:
-            why = (error.strerror or "cannot write").lower()
-            raise CommandError(f"{path}: {why}", USAGE) from None
 
 
 def _line(axes: Axes, name: str, line: CalibrationLine) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import inf, nan
+from pathlib import Path
 from typing import NoReturn
 
 from gritd.estimator.config.names import EXPECTED, is_file_name
@@ -21,6 +23,18 @@ class CommandError(Exception):
     def __init__(self, message: object, code: int = FAILED) -> None:
         super().__init__(message)
         self.code = code
+
+
+@contextmanager
+def os_errors(path: Path | None = None) -> Iterator[None]:
+    """What the operating system refuses becomes a CommandError of the file, of `path` where the
+    error names none.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise CommandError(f"{error.filename or path}: {reason}", USAGE) from None
 
 
 class Parser(argparse.ArgumentParser):

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
-from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.cli.command import USAGE, CommandError, os_errors
 from gritd.tools.cli.files import writable
 from gritd.tools.cli.yaml_edit import EditedYaml
 
@@ -56,12 +56,9 @@ def save(text: str, source: Path, place: Path) -> Path | None:
     text = _begun(text if own else _moved(text, source, place))
     config.loads(text, str(place), place.resolve().parent)
 
-    try:
+    with os_errors(place):
         backup = _backed_up(source.resolve()) if own else None
         _replace(place.resolve(), text)
-    except OSError as error:
-        reason = (error.strerror or "cannot be written").lower()
-        raise CommandError(f"{error.filename or place}: {reason}", USAGE) from None
     return backup
 
 

@@ -19,10 +19,10 @@ from gritd.tools.cli.command import (
     DAMAGED,
     DONE,
     FAILED,
-    USAGE,
     CommandError,
     Parser,
     add_configuration,
+    os_errors,
 )
 from gritd.tools.cli.files import writable
 from gritd.tools.cli.optional import require
@@ -63,15 +63,11 @@ def main(argv: Sequence[str]) -> int:
             command=["gritd", "compare", *argv],
         )
 
-    try:
+    with os_errors():
         if arguments.report:
             arguments.report.write_text(comparison.render(fitted), encoding="utf-8")
         if arguments.png:
             importlib.import_module("gritd.tools.report.sheet").draw(arguments.png, fitted)
-    except OSError as error:
-        raise CommandError(
-            f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
-        ) from None
 
     print(comparison.printed(fitted))
     return DAMAGED if fitted.damage else DONE

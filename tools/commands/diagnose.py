@@ -29,6 +29,7 @@ from gritd.tools.cli.command import (
     CommandError,
     Parser,
     add_configuration,
+    os_errors,
     whole,
 )
 from gritd.tools.cli.files import writable
@@ -250,7 +251,7 @@ def _tell_written(arguments: argparse.Namespace) -> None:
 def _write(
     arguments: argparse.Namespace, diagnosis: Diagnosis, configuration: config.Configuration
 ) -> None:
-    try:
+    with os_errors():
         if arguments.json is not None:
             written = json.dumps(diagnosis.to_json(), ensure_ascii=False, indent=1) + "\n"
             arguments.json.write_text(written, encoding="utf-8")
@@ -258,10 +259,6 @@ def _write(
             importlib.import_module("gritd.tools.report.diagnosis").write(
                 diagnosis, arguments.report
             )
-    except OSError as error:
-        raise CommandError(
-            f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
-        ) from None
 
     if arguments.apply is not None:
         _apply(arguments, diagnosis, configuration)

@@ -34,6 +34,7 @@ from gritd.tools.cli.command import (
     CommandError,
     Parser,
     add_configuration,
+    os_errors,
 )
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.explain.provenance import check_rig
@@ -300,10 +301,8 @@ def _write(path: Path, runs: Sequence[BedRun], repeatability: Repeatability) -> 
         "reason": str(doubted(runs)),
         "together": _json(runs[-1].known),
     }
-    try:
+    with os_errors(path):
         path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise CommandError(f"{path}: {(error.strerror or '').lower()}", USAGE) from None
 
 
 def _run_json(run: BedRun) -> dict[str, Any]:

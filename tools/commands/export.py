@@ -12,7 +12,7 @@ from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, os_errors
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
 from gritd.tools.messages.decoders import Undecodable
@@ -34,11 +34,9 @@ def main(argv: Sequence[str]) -> int:
     topics, left_out = _exported(recordings, _chosen(recordings, arguments.topic))
     folder = _folder(arguments)
 
-    try:
+    with os_errors(folder):
         for path in _written(recordings, topics, folder, arguments.form):
             print(path)
-    except OSError as error:
-        raise CommandError(f"{error.filename}: {error.strerror}", USAGE) from None
 
     for line in left_out:
         print(visible(f"gritd: {arguments.file}: left out: {line}"), file=sys.stderr)
@@ -82,10 +80,8 @@ def _chosen(recordings: Sequence[Recording], wanted: Sequence[str]) -> list[str]
 def _folder(arguments: Namespace) -> Path:
     """A new or empty folder for the tables. Raises CommandError."""
     folder: Path = arguments.output or arguments.file.with_suffix("")
-    try:
+    with os_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CommandError(f"{folder}: {(error.strerror or '').lower()}", USAGE) from None
     if any(folder.iterdir()):
         raise CommandError(f"{folder}: holds files already; expected a new folder", USAGE)
     return folder

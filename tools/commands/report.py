@@ -18,10 +18,10 @@ from gritd.tools.cli.command import (
     DAMAGED,
     DONE,
     FAILED,
-    USAGE,
     CommandError,
     Parser,
     add_configuration,
+    os_errors,
 )
 from gritd.tools.cli.optional import require
 from gritd.tools.commands.estimate import (
@@ -43,10 +43,8 @@ def main(argv: Sequence[str]) -> int:
         require("matplotlib", "--figure")
 
     reported = _campaign(arguments, ["gritd", "report", *argv])
-    try:
+    with os_errors(output):
         _write(reported, arguments, output)
-    except OSError as error:
-        raise CommandError(f"{output}: {(error.strerror or '').lower()}", USAGE) from None
     print(output)
 
     read = [run.run.recording for run in reported.runs]

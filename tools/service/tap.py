@@ -22,7 +22,7 @@ from gritd.estimator.offline.playback import ticks_at
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.topics import TOPICS, messages_of
-from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.cli.command import DAMAGED, CommandError, os_errors
 from gritd.tools.cli.progress import Progress
 
 # [ns] a recording keeps seconds as int32, and a stamp may lie before its bytes
@@ -37,10 +37,8 @@ class Taps:
 
     def __init__(self, folder: Path, settings: Settings) -> None:
         self._reported: set[Path] = set()
-        try:
+        with os_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise CommandError(f"{folder}: {error.strerror}", USAGE) from None
 
         mode = MODES[settings.logging.readable_by]
         self.writers = {

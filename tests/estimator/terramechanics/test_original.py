@@ -12,10 +12,8 @@ from gritd.estimator.terramechanics.original import (
     arc,
     contact,
     forces,
-    front_stress,
     integrate,
     janosi,
-    rear_stress,
     shear_displacement,
     theta_m,
     velocity_ratio,
@@ -153,16 +151,6 @@ def test_stresses_can_be_changed_between_contact_and_integrate() -> None:
     assert np.all(without_shear.torque == 0) and np.all(
         without_shear.drawbar_pull == -without_shear.resistance
     )
-
-
-def test_rear_stress_meets_front_stress_at_the_peak_and_vanishes_at_exit() -> None:
-    theta_1, peak, theta_2 = 0.6, 0.25, -0.1
-    at_peak = front_stress(WHEEL, SAND, arc(theta_1, peak))
-    assert rear_stress(WHEEL, SAND, theta_1, peak, peak, theta_2) == pytest.approx(
-        float(at_peak), rel=1e-12
-    )
-    assert rear_stress(WHEEL, SAND, theta_1, peak, theta_2, theta_2) == pytest.approx(0.0, abs=1e-6)
-    assert front_stress(WHEEL, SAND, arc(theta_1, theta_1 + 0.1)) == 0.0
 
 
 def test_angle_of_maximum_stress() -> None:

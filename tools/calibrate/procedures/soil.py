@@ -19,7 +19,7 @@ from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate import spikes
 from gritd.tools.calibrate.outcome import CalibratedKey, CalibrationOutcome
-from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
+from gritd.tools.cli.command import DAMAGED, FAILED, CommandError, os_errors
 
 SUMMARY = "plate tests: sinkage exponent and moduli with their scatter, into the soil's prior"
 DIAMETER = re.compile(r"plate\s*diameter\s*:?\s*([\d.]+)\s*(mm|cm|m)\b", re.IGNORECASE)
@@ -51,10 +51,8 @@ def read(path: Path) -> Press:
     """A text file with `Plate Diameter: 4.50cm`, then pairs of force [N] and sinkage [mm]. Raises
     CommandError.
     """
-    try:
+    with os_errors(path):
         text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise CommandError(f"{path}: {(error.strerror or '').lower()}", USAGE) from None
 
     diameter = DIAMETER.search(text)
     if diameter is None:

@@ -41,7 +41,7 @@ def _points(value: float, own: float) -> Array:
 
 
 def _prior(at: Array) -> Array:
-    wrong, far = TUNING.explain.stated_wrong, TUNING.explain.stated_far
+    wrong, far = TUNING.screen.level, TUNING.explain.stated_far
     return np.asarray((1.0 - wrong) * _normal(at) + wrong / far * _normal(at / far))
 
 

@@ -180,14 +180,15 @@ class _Told:
         return f"while the wheel turns {self._say(mean)}, at rest {known}"
 
     def along(self, covariate: str) -> str:
-        """Means at the low and the high end, and in the middle where that is not between them."""
+        """Means of the lower and the upper third, and of the middle one where that is not between
+        them.
+        """
         x, index = self._stack.covariate(covariate), np.flatnonzero(self._own)
-        parts = np.array_split(index[np.argsort(x[index], kind="stable")], TUNING.explain.parts)
-        ends = [parts[0], parts[len(parts) // 2], parts[-1]]
-        (low, middle, high) = (float(self._residual[part].mean()) for part in ends)
+        parts = np.array_split(index[np.argsort(x[index], kind="stable")], 3)
+        (low, middle, high) = (float(self._residual[part].mean()) for part in parts)
         told = [0, 2] if min(low, high) <= middle <= max(low, high) else [0, 1, 2]
 
-        at = self._apart(covariate, [float(x[ends[k]].mean()) for k in told])
+        at = self._apart(covariate, [float(x[parts[k]].mean()) for k in told])
         first, *rest = (self._say((low, middle, high)[k]) for k in told)
         others = (f"{_brief(say)} at {v}" for say, v in zip(rest, at[1:], strict=True))
         return ", ".join([f"{first} at {AT.get(covariate, '{}').format(at[0])}", *others])

@@ -47,7 +47,7 @@ def spikes(
     if explainable is not None and spiked.any():
         there = explainable[spiked]
         squares = np.sum(explainable**2, axis=0)
-        only = np.sum(there**2, axis=0) > TUNING.noise.sudden * np.maximum(squares, SQUARE)
+        only = 2.0 * np.sum(there**2, axis=0) > np.maximum(squares, SQUARE)
         sudden = there[:, only]
         off[spiked] -= sudden @ np.linalg.lstsq(sudden, off[spiked], rcond=None)[0]
     return np.where(spiked & (np.abs(off) > least), np.abs(off), 0.0)
@@ -158,7 +158,7 @@ def calmer(
 
     power, usual_power = (c.sigma**2 * _slow_power(c, step) for c in (own, usual))
     ratio = max(own.sigma / usual.sigma, float(np.sqrt(power / usual_power)))
-    times = np.where(stack.idle, np.clip(ratio, TUNING.noise.calmest, 1.0), 1.0)
+    times = np.where(stack.idle, np.clip(ratio, TUNING.noise.least_noise, 1.0), 1.0)
     return replace(noise, rougher=noise.times * times)
 
 
@@ -203,15 +203,15 @@ def restless(noise: Noise, residual: Array) -> Noise:
 
 def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:
     """By what the noise is larger about each value (n,); 1 where it is hardly larger."""
-    if residual.size < TUNING.noise.restless_values:
+    if residual.size < TUNING.rig.unrest_values:
         return np.ones(residual.size)
     kept_slow = np.exp(-step_of(gaps) / colour.time)
     kept_fast = np.exp(-1.0 / TUNING.noise.fast_time)
     shared = colour.slow * kept_slow + colour.fast * kept_fast
-    usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, TUNING.noise.restless_least))
+    usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, TUNING.noise.least_noise))
 
     differences = np.abs(np.diff(residual, prepend=residual[0]))
-    about = median_filter(differences, TUNING.noise.restless_values, mode="nearest")
+    about = median_filter(differences, TUNING.rig.unrest_values, mode="nearest")
     larger = NORMAL * about / usual
     return np.where(larger > TUNING.noise.restless, larger, 1.0)
 

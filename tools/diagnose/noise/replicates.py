@@ -176,7 +176,12 @@ def _one_condition(own: Bools, label: Index) -> bool:
     meanwhile.
     """
     most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
-    return bool(most >= max(TUNING.noise.drift_values, TUNING.noise.mostly * int(own.sum())))
+    return bool(
+        most
+        >= max(
+            TUNING.noise.cell_values * TUNING.noise.drift_shapes, TUNING.noise.mostly * own.sum()
+        )
+    )
 
 
 def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCondition | None:

@@ -99,5 +99,5 @@ def same(one: SpectralLine, other: SpectralLine) -> bool:
 
 def _near(one: SpectralLine, other: SpectralLine) -> bool:
     apart = max(one.cell, other.cell)
-    doubt = TUNING.orders.apart_sigma * float(np.hypot(one.sigma, other.sigma))
+    doubt = TUNING.rig.doubt * float(np.hypot(one.sigma, other.sigma))
     return abs(one.at - other.at) < max(apart, doubt)

@@ -327,13 +327,11 @@ def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channe
     if not channels:
         return None
     strongest = []
-    sure, promising = (
-        float(np.log(p / tried)) for p in (TUNING.orders.level, TUNING.orders.promising)
-    )
+    sure = float(np.log(TUNING.orders.level / tried))
     for channel in channels:
         for axis in AXES:
             chance, place = channel.strongest(axis, sure)
-            if chance < promising:
+            if chance < -np.log(tried):  # noise alone has less than one of these
                 chance = min(chance, channel.cleaned(axis, place))
             strongest.append((chance, channel, axis, place))
 

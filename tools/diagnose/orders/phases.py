@@ -53,7 +53,7 @@ def _phase(a: Amplitude) -> float:
 
 
 def _sure(a: Amplitude) -> bool:
-    return a.size > TUNING.orders.sure_phase * a.sigma
+    return a.size > TUNING.rig.doubt * a.sigma
 
 
 def _wrapped(angle: float) -> float:

@@ -75,11 +75,7 @@ def fastest(part: Samples, axis: str) -> float:
     """The fastest ripple that is no alias, in cycles a turn or a second."""
     steps = np.abs(np.diff(part.of(axis)))
     inside = steps[(np.diff(part.stretch) == 0) & (steps > 0.0)]
-    return (
-        float(TUNING.orders.nyquist / np.quantile(inside, TUNING.orders.usual_step))
-        if inside.size
-        else 0.0
-    )
+    return float(TUNING.orders.nyquist / np.median(inside)) if inside.size else 0.0
 
 
 def spectrum(part: Samples, axis: str, places: Places) -> Spectrum:
@@ -112,7 +108,7 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
 
     below, few = side(at - far, at - near + 1)
     above, many = side(at + near, at + far + 1)
-    known = (np.minimum(few, many) >= TUNING.orders.least_neighbours) & (at < high)
+    known = (np.minimum(few, many) >= 2.0 * TUNING.orders.near) & (at < high)
 
     together = 4.0 / (1.0 / np.maximum(few, SQUARE) + 1.0 / np.maximum(many, SQUARE))
     level = np.exp(0.5 * (below + above) + np.euler_gamma)

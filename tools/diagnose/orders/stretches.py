@@ -133,7 +133,7 @@ def stretches(motion: GridMotion) -> tuple[Array, Array]:
 
     half = 0.5 * float(np.median(np.diff(motion.time))) if motion.time.size > 1 else 0.0
     begins, ends = motion.time[first] - half, motion.time[last] + half
-    long = ends - begins >= TUNING.orders.shortest
+    long = ends - begins >= TUNING.rig.hold
     return begins[long], ends[long]
 
 
@@ -156,7 +156,7 @@ def _steady(motion: GridMotion) -> NDArray[np.bool_]:
 
 def _without_pulses(load: Array, step: float) -> Array:
     """A load (n,) whose steps stay and whose ripples and pulses are gone."""
-    width = 2 * round(0.5 * TUNING.orders.shortest / step) + 1
+    width = 2 * round(0.5 * TUNING.rig.hold / step) + 1
     return np.asarray(median_filter(np.nan_to_num(load), size=width, mode="nearest"))
 
 

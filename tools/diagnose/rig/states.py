@@ -62,7 +62,7 @@ def turned_back(motion: Motion, settings: Settings) -> Bools:
 
     back = np.diff(way[begins], prepend=way[begins[0]]) != 0.0
     last = np.searchsorted(begins, np.arange(way.size), side="right") - 1
-    turned: Bools = _inside(way, TUNING.rig.turned, TUNING.rig.turned) & back[last]
+    turned: Bools = _inside(way, 1, 1) & back[last]
     return turned
 
 

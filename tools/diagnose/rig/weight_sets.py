@@ -29,8 +29,8 @@ class WeightSets:
 def weight_sets(loads: Sequence[Array]) -> WeightSets:
     """The sets in use, from the weights (n,) of each run [N]; none where all runs have the same."""
     values, count = np.unique(np.concatenate(loads), return_counts=True)
-    held = values[(count >= TUNING.rig.held_values) & (values > 0.0)]
-    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.same_weights) + 1)
+    held = values[(count >= TUNING.rig.encoder_readings) & (values > 0.0)]
+    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.least_weights) + 1)
     if not 1 < len(sets) <= TUNING.rig.most_sets:
         none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
         return WeightSets((), none)
@@ -40,4 +40,4 @@ def weight_sets(loads: Sequence[Array]) -> WeightSets:
 
 def _nearest(load: Array, middle: Array) -> Index:
     apart = np.abs(load[:, None] / middle - 1.0)
-    return np.where(apart.min(axis=1) <= TUNING.rig.same_weights, apart.argmin(axis=1), -1)
+    return np.where(apart.min(axis=1) <= TUNING.rig.least_weights, apart.argmin(axis=1), -1)

@@ -248,7 +248,7 @@ def _law(radius: float, loss: bool) -> LawForm:
 
 def _shortcomings(runs: Sequence[GridRun], channels: Sequence[str]) -> Iterator[str]:
     loads = np.concatenate([run.covariates["load"] for run in runs])
-    if np.ptp(loads) < TUNING.rig.one_load * max(float(np.max(loads)), SPAN):
+    if np.ptp(loads) < TUNING.rig.close_load * max(float(np.max(loads)), SPAN):
         yield (
             "One load only: c and tan φ are nearly inseparable, and so are effects that differ"
             " by load alone."

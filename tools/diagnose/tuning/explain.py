@@ -36,9 +36,6 @@ class Explain:
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
 
     # --- reconciled.py ---
-    stated_wrong: float = tuned(
-        0.01, "share", "of what is stated of soil is wrong: one in a hundred", "judgement"
-    )
     stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off", "judgement")
     told_freedom: float = tuned(
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
@@ -59,7 +56,6 @@ class Explain:
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
 
     # --- wording.py ---
-    parts: int = tuned(5, "parts", "of a covariate's values: the outer two and the middle shown")
 
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")

@@ -56,17 +56,12 @@ class NoiseTuning:
     spike: float = tuned(
         6.0, "σ", "from the median of its neighbours: such a value counts as much less certain"
     )
-    sudden: float = tuned(
-        0.5, "share", "of an effect's squares at spikes: then it acts at little else"
-    )
     spike_neighbours: int = tuned(5, "values", "whose median tells a spike")
     restless: float = tuned(
         1.5, "-", "times the noise's differences from value to value: the noise is larger there"
     )
-    restless_values: int = tuned(41, "values", "whose median tells how the differences are there")
-    restless_least: float = tuned(0.05, "share", "of the noise that differs from value to value")
-    calmest: float = tuned(
-        0.02, "-", "times the noise of what the drive loses: that of an idle motor, at least"
+    least_noise: float = tuned(
+        0.05, "share", "of the noise: so much differs from value to value, and an idle motor has"
     )
     floor: float = tuned(
         1e-5, "-", "of a channel's size: no noise is below it, simulations need a scale"
@@ -91,7 +86,6 @@ class NoiseTuning:
     )
     least_pairs: int = tuned(2, "comparisons", "of replicates at least")
     drift_shapes: int = tuned(4, "shapes", "of what a run does: a mean and three of drift")
-    drift_values: int = tuned(40, "values", "that drifts need")
     mostly: float = tuned(
         0.9,
         "share",

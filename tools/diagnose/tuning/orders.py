@@ -17,7 +17,6 @@ class Orders:
     changed: float = tuned(0.02, "-", "relative change of a speed or load within `apart`: a ramp")
     apart: float = tuned(0.3, "s", "over which a change of speed or load is looked for")
     change_noise: float = tuned(5.0, "σ", "of their own noise: less is no ramp")
-    shortest: float = tuned(1.0, "s", "a shorter stretch is not used")
     most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
     longest_seconds: float = tuned(300.0, "s", "likewise", "memory")
     longest_part: float = tuned(20.0, "turns", "a longer run is cut, each part its own phase")
@@ -27,18 +26,15 @@ class Orders:
     cycles: float = tuned(2.0, "cycles", "at least in the longest stretch")
     density: float = tuned(4.0, "-", "places tried in each that the longest run resolves")
     nyquist: float = tuned(0.45, "-", "of the samples: a faster ripple is an alias")
-    usual_step: float = tuned(0.9, "quantile", "of the steps between samples: few are longer")
     highest_order: float = tuned(400.0, "1/turn", "tried: the library's 200 and a harmonic of it")
     highest_frequency: float = tuned(
         60.0, "Hz", "tried in time: the grid damps what is faster twentyfold", "run time"
     )
     near: float = tuned(1.5, "cells", "nearer in the spectrum is the line itself")
     far: float = tuned(8.0, "cells", "as far the spectrum of the noise is smooth", NEIGHBOURS)
-    least_neighbours: float = tuned(3.0, "cells", "on either side, or nothing is known")
 
     # --- lines.py ---
     level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
-    promising: float = tuned(0.2, "probability", "of chance: likelier lines are looked at closer")
     rest: float = tuned(0.03, "-", "of a louder line near by: what is left about it")
     rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
@@ -50,11 +46,9 @@ class Orders:
     supporting: int = tuned(3, "times", "an order, whose evidence supports it as a count")
     supports: float = tuned(2.0, "nats", "of each: less is chance, three places are tried in each")
     behind: float = tuned(10.0, "nats", "of support: orders so far behind the best are no count")
-    apart_sigma: float = tuned(4.0, "σ", "of their places: closer lines are one")
     known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")
     harmonics: int = tuned(6, "times", "the order of a louder line: its harmonic")
 
     # --- phases.py ---
     two_speeds: float = tuned(1.2, "-", "fastest over slowest: one speed cannot tell a ripple")
     out_of_step: float = tuned(0.6, "rad", "of a ripple: runs that differ by less begin alike")
-    sure_phase: float = tuned(6.0, "σ", "of a ripple in a run, whose phase then is known")

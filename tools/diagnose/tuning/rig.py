@@ -53,7 +53,9 @@ class RigTuning:
     )
     lean: float = tuned(0.02, "-", "of a force sensor across the wheel: a share of the load; 1°")
     scale_floor: float = tuned(1e-3, "-", "relative: no sensor's scale is known better", DESIGN)
-    least_weights: float = tuned(2e-3, "-", "relative: no weights are known better", DESIGN)
+    least_weights: float = tuned(
+        2e-3, "-", "relative: no weights are known better, closer ones are one stack", DESIGN
+    )
     own_weights: float = tuned(
         0.7, "-", "part of a common error of the weights that each set may have for itself"
     )
@@ -95,7 +97,9 @@ class RigTuning:
     longest: float = tuned(
         86_400.0, "s", "of a recording: what is sought over its time grows with this", "memory"
     )
-    encoder_readings: int = tuned(10, "readings", "of each encoder at least")
+    encoder_readings: int = tuned(
+        10, "readings", "of an encoder at least, or values at one load: a set of weights"
+    )
     drive_readings: int = tuned(100, "readings", "of each channel of a drive's log at least")
     grid_values: int = tuned(5, "values", "of a recording on its grid at least")
 
@@ -118,29 +122,21 @@ class RigTuning:
     unrest_largest: float = tuned(0.03, "-", "usual unrest: more is no noise of a speed sensor")
 
     # --- weight_sets.py ---
-    held_values: int = tuned(
-        10, "values", "at exactly one load make a set of weights; in between they are changed"
-    )
-    same_weights: float = tuned(
-        0.002, "-", "relative distance from which stated weights are another stack", "rounding"
-    )
     most_sets: int = tuned(60, "sets", "at most", "run time")
 
     # --- weights.py ---
     close_load: float = tuned(
-        0.15, "-", "relative distance of measured and stated load at which both mean the same"
+        0.15, "-", "relative distance of two loads at which both mean the same"
     )
     close_force: float = tuned(1.0, "N", "beside this: weights are not stated to less")
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
-    doubt: float = tuned(4.0, "σ", "of weights or a current at rest: beyond, they are others")
+    doubt: float = tuned(
+        4.0, "σ", "of weights, a current at rest, or a line: beyond, they are others"
+    )
     load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
     load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
-    hold: float = tuned(1.0, "s", "weights stay for at least this long")
-
-    turned: int = tuned(
-        1, "intervals", "from a reversal or a stop: the loss between two torques settles"
-    )
+    hold: float = tuned(1.0, "s", "weights and speeds are held for at least so long")
 
     # --- wheel.py ---
     holding: float = tuned(
@@ -150,7 +146,6 @@ class RigTuning:
     unknown_offset: float = tuned(
         1e5, "N or N·m", "an offset less certain says that the channel was not measured"
     )
-    one_load: float = tuned(0.1, "-", "relative spread below which the loads are one")
     prepared: Mapping[str, float] = tuned(
         PREPARED, "-", "relative repeatability of a bed that is raked and levelled anew"
     )

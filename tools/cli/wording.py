@@ -81,6 +81,16 @@ def percent(share: float | None) -> str:
     return f"{fixed(100.0 * share, 0)} %"
 
 
+def chance(p: float) -> str:
+    """A p-value: small ones as a bound."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def sigmas(u: float) -> str:
+    """How far something stands from what is known of it, with its sign."""
+    return f"{'+' if u >= 0.0 else ''}{fixed(u, 1)} σ"
+
+
 def spaced(value: float | None, unit: str, digits: int = 3) -> str:
     """A number and its unit, both as shown."""
     text = number(value, digits)

@@ -11,6 +11,7 @@ from typing import Any
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.metadata import versions
+from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.diagnose.explain import provenance
@@ -61,8 +62,9 @@ def of_files(
         warnings.simplefilter("ignore", RuntimeWarning)
         soil = any(constant.soil for constant in rig.constants)
         # long recordings are large: they are released, and read again where they are needed
-        work = partial(filtered, configuration, recordings, soil) if online else Filtered
-        del recordings, known
+        reads = [partial(_same, recording) for recording in recordings]
+        work = partial(filtered, settings, reads, soil) if online else Filtered
+        del recordings, known, reads
         with meanwhile(jobs, work) as before:
             del work
             diagnosis = diagnose(rig, seed, redo, step, jobs, quick)
@@ -92,3 +94,7 @@ def _redo(
         **({"quick": True} if quick else {}),
         "configuration": configuration.text,
     }
+
+
+def _same(recording: Recording) -> Recording:
+    return recording

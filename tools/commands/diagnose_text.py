@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 
 from gritd.estimator.visible import visible
-from gritd.tools.cli.wording import number, shown, spelled
+from gritd.tools.cli.wording import chance, number, percent, shown, spelled
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
     Fit,
@@ -27,12 +26,12 @@ def text(diagnosis: Diagnosis) -> str:
     """The verdict for a person."""
     lines = [
         f"verdict: {diagnosis.verdict}. {diagnosis.summary}",
-        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[1:SHOWN]),
+        *(f"  where: {place.where} ({chance(place.p)})" for place in diagnosis.location[1:SHOWN]),
         *(line for of in _shown(diagnosis) for line in _hypothesis(of, diagnosis)),
         *_had(diagnosis.reference),
     ]
-    if diagnosis.law is not None:
-        lines.append(f"  law: {diagnosis.law.expression} (takes {diagnosis.law.share:.0%})")
+    if (law := diagnosis.law) is not None and law.parameters:
+        lines.append(f"  law: {law.expression} (takes {percent(law.share)} of the misfit)")
     if diagnosis.soil is not None:
         lines += _soil(diagnosis.soil)
     lines += _fit(diagnosis.fit)
@@ -58,7 +57,7 @@ def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> Iterator[str]:
     chance = f"probability {of.probability:.{DIGITS}f}"
     other = "rival" if diagnosis.accepted else "not accepted"
     head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
-    head += f", form off by {of.other_forms:.0%}" if of.other_forms else ""
+    head += f", form off by {percent(of.other_forms)}" if of.other_forms else ""
     values = _listed(of.parameters)
     others = of.indistinguishable_from
     alike = f"; cannot be distinguished from {', '.join(others)}" if others else ""
@@ -108,4 +107,4 @@ def _foreseen(following: NextExperiment, verdict: str) -> str:
     gain, ending = following.expected_gain_nats, ""
     if following.separates:
         ending = f": {to_tell(verdict, following.separates)}"
-    return f"{ending} (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ending
+    return f"{ending} (expected gain {gain:.0f} nats)" if gain >= 1.0 else ending

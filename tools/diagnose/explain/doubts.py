@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gritd.tools.cli.wording import fixed, shown, spaced, spelled
+from gritd.tools.cli.wording import fixed, shown, sigmas, spaced, spelled
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Rig
@@ -27,7 +27,7 @@ def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
 
 def _strained(rig: Rig, model: Model) -> Iterator[str]:
     for name, strain in strains(rig, model):
-        yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
+        yield f"Strained: {name} stands {sigmas(strain)} from what is known of it."
 
 
 def _bounded(rig: Rig, model: Model) -> Iterator[str]:

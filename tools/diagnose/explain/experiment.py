@@ -81,13 +81,9 @@ def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExp
 
 def _by_hand(rig: Rig, names: Sequence[str]) -> NextExperiment | None:
     """What the rivals' own files name, where nothing is foreseen to tell."""
-    for name in names:
-        for other, key in rig.effects[name].confusable_with.items():
-            if other in names:
-                return NextExperiment(
-                    key, EXPERIMENTS[key], tuple(names), float("nan"), float("nan")
-                )
-    return None
+    keys = (rig.effects[one].confusable_with.get(other) for one in names for other in names)
+    key = next(filter(None, keys), None)
+    return _foretold(key, float("nan"), tuple(names)) if key else None
 
 
 # ---- rivals ------------------------------------------------------------------------------------
@@ -102,47 +98,29 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
 
 def _told_apart(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
     """Expected gain between the first and every other rival [nats]."""
-    rig = search.problem.stack.rig
-    first, *others = rivals
-    here = rig.foresee(key, first.fitted.u, first.fitted.acting)
-    slopes = _slopes(search, key, here, first.fitted.u, first.fitted.acting)
-    gains = []
-    for other in others:
-        there = rig.foresee(key, other.fitted.u, other.fitted.acting)
-        gains.append(_gain(search, here, _values(there) - _values(here), slopes))
-    return gains
+    first, *others = (m.fitted for m in rivals)
+    return _gains(search, key, first.u, first.acting, [(m.u, m.acting) for m in others])
 
 
 def _measured(rig: Rig, rivals: list[Model]) -> dict[str, list[float]]:
     """What instruments that the rivals' own files name would tell between the first and every
-    other.
+    other: half the squared larger strength, over what the instrument can tell.
     """
     first, *others = rivals
-    keys = {
-        k
-        for m in rivals
-        for n in m.names
-        for k in rig.effects[n].confusable_with.values()
-        if k not in rig.words.menu.driven
-    }
+    gains: dict[str, list[float]] = {}
 
-    return {key: [_read(rig, first, other, key) for other in others] for key in sorted(keys)}
+    for number, other in enumerate(others):
+        for model, rival in ((first, other), (other, first)):
+            for f, x in zip(model.fitted.free, model.fitted.x.tolist(), strict=True):
+                known = rig.effects[f.name].confusable_with
+                keys = {known[name] for name in rival.names if name in known}
+                for key in keys - set(rig.words.menu.driven):
+                    told = 0.5 * (x / TUNING.explain.instrument) ** 2
+                    each = gains.setdefault(key, [0.0 for _ in others])
+                    if f.parameter.role == "strength":
+                        each[number] = max(each[number], told)
 
-
-def _read(rig: Rig, one: Model, other: Model, key: str) -> float:
-    """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell
-    these two.
-    """
-    gain = 0.0
-    for model, rival in ((one, other), (other, one)):
-        for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
-            tells = any(
-                rig.effects[f.name].confusable_with.get(name) == key for name in rival.names
-            )
-            if tells and f.parameter.role == "strength":
-                gain = max(gain, 0.5 * float(x / TUNING.explain.instrument) ** 2)
-
-    return gain
+    return dict(sorted(gains.items()))
 
 
 # ---- insufficient, and not in the list ---------------------------------------------------------
@@ -155,16 +133,10 @@ def _unseen_shown(search: EffectSearch) -> dict[str, dict[str, float]]:
     rig, base = search.problem.stack.rig, search.base
     unseen = {name: _expected(rig.effects[name]) for name in _not_shown(search)}
 
-    out = {}
-    for key in rig.words.menu.driven if unseen else ():
-        here = rig.foresee(key, base.fitted.u, ())
-        slopes = _slopes(search, key, here, base.fitted.u, ())
-        there = {n: rig.foresee(key, base.fitted.u, (one,)) for n, one in unseen.items()}
-        out[key] = {
-            name: _gain(search, here, _values(one) - _values(here), slopes)
-            for name, one in there.items()
-        }
-    return out
+    u, driven = base.fitted.u, rig.words.menu.driven if unseen else ()
+    every = [(u, (one,)) for one in unseen.values()]
+    gains = {key: _gains(search, key, u, (), every) for key in driven}
+    return {key: dict(zip(unseen, each, strict=True)) for key, each in gains.items()}
 
 
 def _not_shown(search: EffectSearch) -> list[str]:
@@ -215,47 +187,50 @@ def _along_misfit(
 # ---- what is foreseen --------------------------------------------------------------------------
 
 
-def _slopes(
-    search: EffectSearch, key: str, here: Foreseen, u: Array, effects: Sequence[Effect]
-) -> Array:
-    """Change of what is foreseen (values, q) for one σ of each soil constant as fitted so far."""
+def _gains(
+    search: EffectSearch,
+    key: str,
+    u: Array,
+    acting: Sequence[Effect],
+    others: Sequence[tuple[Array, Sequence[Effect]]],
+) -> list[float]:
+    """What an experiment is expected to tell between constants u (q,) with effects, and each of
+    some others [nats]: half the squared change of what is foreseen in units of noise, the soil's
+    uncertainty among it.
+    """
     rig = search.problem.stack.rig
-    sigma = search.base.fitted.sigma
-    slopes, step = [], TUNING.fit.derivative_steps[1]
+    here = rig.foresee(key, u, acting)
+    scale = _noise(search, here)
 
+    def changed(at: Array, effects: Sequence[Effect]) -> Array:
+        return np.nan_to_num(_values(rig.foresee(key, at, effects)) - _values(here)) / scale
+
+    step, soil = TUNING.fit.derivative_steps[1], []
     for i, constant in enumerate(rig.constants):
         if constant.soil:
-            moved = u.copy()
-            moved[i] += step
-            change = _values(rig.foresee(key, moved, effects)) - _values(here)
-            slopes.append(change / step * sigma[i])
-    return np.column_stack(slopes)
+            moved = u + step * (np.arange(u.size) == i)
+            soil.append(changed(moved, acting) / step * search.base.fitted.sigma[i])
+
+    slopes = np.column_stack(soil)
+    inner = np.eye(len(soil)) + slopes.T @ slopes
+    gains = []
+    for change in (changed(*other) for other in others):
+        pulled = slopes.T @ change
+        left = float(change @ change - pulled @ np.linalg.solve(inner, pulled))
+        gains.append(max(0.5 * left, 0.0))
+    return gains
 
 
 def _values(foreseen: Foreseen) -> Array:
-    return np.concatenate([np.asarray(v)[:: _apart_by()] for v in foreseen.channels.values()])
+    """One value a second of every channel: neighbours share their noise."""
+    return np.concatenate([v[:: round(TUNING.rig.rate)] for v in foreseen.channels.values()])
 
 
-def _apart_by() -> int:
-    """Values in a second, of which one counts: neighbours share their noise."""
-    return round(TUNING.rig.rate)
-
-
-def _gain(search: EffectSearch, here: Foreseen, change: Array, slopes: Array) -> float:
-    """Half the squared change in units of noise, the soil's uncertainty among it [nats]."""
-    stack = search.problem.stack
-    sigma = []
+def _noise(search: EffectSearch, here: Foreseen) -> Array:
+    """Standard deviation of each of these values; infinite where a channel tells nothing."""
+    stack, told = search.problem.stack, {}
     for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
         usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
-        known = np.where(
-            here.tells[channel],
-            np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual),
-            np.inf,
-        )
-        sigma.append(known[:: _apart_by()])
-
-    scale = np.concatenate(sigma)
-    ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
-    pulled = soil.T @ ready
-    taken = pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)
-    return float(max(0.5 * (ready @ ready - taken), 0.0))
+        sigma = np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual)
+        told[channel] = np.where(here.tells[channel], sigma, np.inf)
+    return _values(Foreseen(told, here.tells))

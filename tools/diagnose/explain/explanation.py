@@ -10,7 +10,7 @@ from typing import Any
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.parallel import meanwhile
-from gritd.tools.cli.wording import listed
+from gritd.tools.cli.wording import listed, sigmas
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import FittedLaw, find_law
@@ -296,7 +296,7 @@ def _remaining(
     the rig has a discrepancy of form.
     """
     if decision.beside is None and strained:
-        held = listed([f"{name} ({strain:+.1f} σ)" for name, strain in strained])
+        held = listed([f"{name} ({sigmas(strain)})" for name, strain in strained])
         return f"What remains is in constants far from what is known of them: {held}."
 
     missed = [words for channel, each in left.items() if (words := missed_words(channel, each))]

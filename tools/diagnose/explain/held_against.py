@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gritd.tools.cli.wording import percent
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, Reference
 from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import HAD, Rig
@@ -48,6 +49,8 @@ def _outside(stack: Stack) -> str:
             (asked < known.min() - room, float(known.min()), "below"),
         ):
             if np.mean(beyond) > TUNING.explain.beyond:
-                parts.append(f"{np.mean(beyond):.0%} {word} {value_of(stack, name, end)}")
+                parts.append(
+                    f"{percent(float(np.mean(beyond)))} {word} {value_of(stack, name, end)}"
+                )
 
     return "; ".join(parts) or "nothing"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -38,16 +37,16 @@ class Filtered:
 
 
 def filtered(
-    configuration: config.Configuration, recordings: Sequence[Recording], soil: bool
+    settings: Settings, reads: Sequence[Callable[[], Recording]], soil: bool, jobs: int = 1
 ) -> Filtered:
-    """By the given configuration; soil: whether the rig has any."""
+    """By a configuration. reads: give a recording each; soil: whether the rig has any; jobs:
+    processes.
+    """
     if not soil:
         return Filtered(note=NO_FILTER)
-
     try:
-        reads = [partial(_same, recording) for recording in recordings]
-        ratios = innovations(configuration.settings, reads)
-    except (RecordingError, config.ConfigError) as error:
+        ratios = innovations(settings, reads, jobs)
+    except RecordingError as error:
         return Filtered(note=_failed(error))
     return Filtered(ratios) if ratios else Filtered(note=NO_UPDATE)
 
@@ -65,37 +64,28 @@ def with_innovations(
     reads: give a recording each, called only where there is an improved one. Where there is none
     `innovation_note` says why.
     """
-    if before.innovations is None:
-        return _noted(diagnosis, before.note)
-    if not diagnosis.accepted and diagnosis.law is None:
-        return _noted(diagnosis, NOTHING_NEW, before.innovations, before.innovations)
+    after = before
+    if before.innovations is not None:
+        after = Filtered(before.innovations, NOTHING_NEW)
+        if diagnosis.accepted or diagnosis.law is not None:
+            try:
+                improved = config.loads(applied(configuration, diagnosis), "improved configuration")
+                after = filtered(improved.settings, reads, True, jobs)
+            except config.ConfigError as error:
+                after = Filtered(note=_failed(error))
 
-    try:
-        improved = config.loads(applied(configuration, diagnosis), "improved configuration")
-        after = innovations(improved.settings, reads, jobs)
-        return _noted(diagnosis, "", before.innovations, after)
-    except (RecordingError, config.ConfigError) as error:
-        return _noted(diagnosis, _failed(error))
-
-
-def _same(recording: Recording) -> Recording:
-    return recording
+    told = before.innovations if after.innovations else None
+    fit = replace(
+        diagnosis.fit,
+        innovation_before=told,
+        innovation_after=after.innovations,
+        innovation_note=after.note,
+    )
+    return replace(diagnosis, fit=fit)
 
 
 def _failed(error: Exception) -> str:
     return f"The on-line filter could not run: {error}."
-
-
-def _noted(
-    diagnosis: Diagnosis,
-    note: str,
-    before: dict[str, float] | None = None,
-    after: dict[str, float] | None = None,
-) -> Diagnosis:
-    fit = replace(
-        diagnosis.fit, innovation_before=before, innovation_after=after, innovation_note=note
-    )
-    return replace(diagnosis, fit=fit)
 
 
 def innovations(

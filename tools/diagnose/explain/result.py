@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from gritd.estimator.model.learnt import LearntForm
+from gritd.tools.cli.wording import listed, sigmas
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Verdict
 
@@ -125,9 +126,8 @@ class SoilFit:
             if math.isfinite(s) and abs(s) >= TUNING.explain.strained_soil
         ]
 
-        moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
-        together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
-        return f"Without an effect the fit moves {together} from what was known." if moved else ""
+        moved = listed([f"{SOIL.get(k, k)} by {sigmas(s)}" for k, s in far])
+        return f"Without an effect the fit moves {moved} from what was known." if moved else ""
 
 
 @dataclass(frozen=True)

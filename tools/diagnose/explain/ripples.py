@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from gritd.estimator.effects.base import Effect, order_of
+from gritd.tools.cli.wording import shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import Ripple
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Rig
@@ -64,13 +65,18 @@ def _listed(rig: Rig, lines: Sequence[SpectralLine]) -> str:
 
 def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:
     first = group[0]
-    sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
+    sizes = ", ".join(f"{spelled(x.channel)} ± {_size(rig, x)}" for x in group)
     low, high = first.frequency
 
     if first.axis == "time":
         return f"{first.at:.2f} Hz ({sizes})"
     hertz = " to ".join(dict.fromkeys((f"{low:.1f}", f"{high:.1f}")))
     return f"{first.at:.2f} times a turn, {hertz} Hz ({sizes})"
+
+
+def _size(rig: Rig, line: SpectralLine) -> str:
+    unit, factor = shown(rig.units[line.channel])
+    return spaced(line.size * factor, unit, 2)
 
 
 def _order(effect: Effect) -> float | None:

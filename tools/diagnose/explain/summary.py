@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gritd.estimator.effects import EFFECTS
-from gritd.tools.cli.wording import listed, number, shown, spelled
+from gritd.tools.cli.wording import chance, listed, number, percent, shown, sigmas, spelled
 from gritd.tools.diagnose.explain.result import Fit, Location
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.screening import Screen
@@ -36,14 +36,15 @@ def summary(
 ) -> str:
     """strained: constants far from what is known of them [σ]."""
     subject = "Model and recordings" if all(rig.new) else "Reference and new campaign"
-    p = f"(p = {screen.p:.2g})"
+    p = f"({chance(screen.p)})"
     if decision.verdict in ("consistent", "insufficient"):
         return _quiet(decision, f"{subject} agree {p}", p, strained)
 
     sentences = [f"{subject} differ {p}."]
     if location:
         first = location[0]
-        sentences = [f"{first.where} {p}; {_held_out(fit, first.channel)}."]
+        unseen = "" if first.channel in worse(fit) else f"; {_held_out(fit, first.channel)}"
+        sentences = [f"{first.where} {p}{unseen}."]
     if decision.verdict == "unlisted":
         resembled = [(r, decision.groups.get(r.name, ())) for r in decision.resembled]
         sentences += [_unexplained(decision), *(_resembling(*each) for each in resembled)]
@@ -51,7 +52,7 @@ def summary(
 
     names = listed(list(decision.best.names))
     verb = "explains" if len(decision.best.names) == 1 else "explain"
-    sentences.append(f"{names} {verb} {decision.share:.0%} of the misfit.")
+    sentences.append(f"{names} {verb} {percent(decision.share)} of the misfit.")
     return " ".join((*_worse(fit), *sentences, *_alike(decision), *_beside(decision)))
 
 
@@ -66,7 +67,7 @@ def worse(fit: Fit) -> list[str]:
 
 
 def _quiet(decision: Decision, agree: str, p: str, strained: Sequence[tuple[str, float]]) -> str:
-    far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
+    far = listed([f"{name} {sigmas(strain)}" for name, strain in strained])
     if decision.verdict == "consistent":
         return f"{agree}{f' only with {far} from what is known' if far else ''}."
     return (
@@ -82,10 +83,12 @@ def _held_out(fit: Fit, channel: str) -> str:
 
 
 def _worse(fit: Fit) -> Iterator[str]:
-    for channel in worse(fit):
+    if far := worse(fit):
+        each = listed([_held_out(fit, channel) for channel in far])
+        these = "these channels: their" if far[1:] else "this channel: its"
         yield (
-            f"In part only: {_held_out(fit, channel)}. Check how the configuration maps this"
-            " channel: its side of the drive, sign and scale."
+            f"In part only: {each}. Check how the configuration maps {these} side of the drive,"
+            " sign and scale."
         )
 
 
@@ -113,18 +116,22 @@ def _unexplained(decision: Decision) -> str:
     if len(alike) < 2 or together <= decision.unlisted:
         return "No listed effect explains it."
     return (
-        f"One of {', '.join(alike)} is there with {together:.0%}, but none of these alone is"
-        f" likelier than that nothing of the list is ({decision.unlisted:.0%})."
+        f"One of {', '.join(alike)} is there with {percent(together)}, but none of these alone is"
+        f" likelier than that nothing of the list is ({percent(decision.unlisted)})."
     )
 
 
 def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
     """What resembles the misfit as well as its rivals do, and why it does not explain it."""
-    why = f"in a form {of.forms:.0%} off ours" if round(of.forms, 2) > 0.0 else "and no more of it"
+    why = (
+        f"in a form {percent(of.forms)} off ours"
+        if round(of.forms, 2) > 0.0
+        else "and no more of it"
+    )
     if not of.foretells:
         why = "but unseen runs are predicted worse with it"
     where = PLACE_OF[EFFECTS[of.name].stage]
-    taken = f"takes {of.share:.0%} of the misfit, {why}: probably something else in {where}."
+    taken = f"takes {percent(of.share)} of the misfit, {why}: probably something else in {where}."
     if not rivals:
         return f"It resembles {of.name}, which {taken}"
     alike = ", ".join((of.name, *sorted(rivals)))

@@ -213,9 +213,9 @@ class _Told:
         return f"at {' and '.join(at)} {self._say(self._mean(inside))}, elsewhere {elsewhere}"
 
     def _apart(self, covariate: str, values: Sequence[float]) -> list[str]:
-        """Values of a covariate, to a tenth of what they differ by, or as whole numbers."""
+        """Values of a covariate, to a hundredth of what they differ by, or as whole numbers."""
         unit, factor = covariate_shown(covariate, self._stack.rig.units.get(covariate, ""))
-        places = max(-magnitude(max(float(np.ptp(values)) * factor, SPAN)), 0)
+        places = max(1 - magnitude(max(float(np.ptp(values)) * factor, SPAN)), 0)
         return [f"{fixed(v * factor, places)} {unit}".rstrip() for v in values]
 
     def between(self, shape: Shape) -> str:

@@ -44,8 +44,10 @@ def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Ind
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
 
         room = own.size // TUNING.noise.values_per_column
-        for axis, parts in _phases(stack, channel):
-            for pairs in _lines(stack, axis, parts, left):
+        phases = _phases(stack, channel)
+        for axis, parts in phases:
+            searches = len(phases) * len(stack.rig.channels)
+            for pairs in _lines(stack, axis, parts, left, searches):
                 room -= pairs.shape[1]
                 if room >= 0:
                     columns.append(pairs)
@@ -101,25 +103,25 @@ def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
     return ((apart >= TUNING.orders.near) & (apart <= TUNING.orders.far)).astype(float)
 
 
-def _phases(stack: Stack, channel: str) -> Iterator[tuple[str, list[Index]]]:
+def _phases(stack: Stack, channel: str) -> list[tuple[str, list[Index]]]:
     """Axes, and the values that share a phase."""
     parts = stretches(stack, channel)
     if not parts:
-        return
-    yield "time", parts
-    if len(parts) > 1:
-        yield "position", [np.concatenate(parts)]
-    yield "position", parts
+        return []
+    shared = [("position", [np.concatenate(parts)])] if len(parts) > 1 else []
+    return [("time", parts), *shared, ("position", parts)]
 
 
-def _lines(stack: Stack, axis: str, parts: list[Index], left: Array) -> Iterator[Array]:
+def _lines(
+    stack: Stack, axis: str, parts: list[Index], left: Array, searches: int
+) -> Iterator[Array]:
     """Columns of one line after the other; `left` (N,) loses them."""
     x = stack.covariate(axis)
     samples = [Samples(x[i], x[i], left[i], np.zeros(i.size, np.int64)) for i in parts]
     if max(float(np.ptp(part.time)) for part in samples) <= SPAN:
         return
 
-    for at in lines_along(samples):
+    for at in lines_along(samples, searches):
         out = np.zeros((x.size, 2 * len(parts)))
         for number, index in enumerate(parts):
             wave = pair(x[index], at)

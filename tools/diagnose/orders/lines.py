@@ -279,13 +279,13 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
     return tuple(_with_harmonics(lines, channels))
 
 
-def lines_along(parts: Sequence[Samples]) -> Iterator[float]:
+def lines_along(parts: Sequence[Samples], searches: int) -> Iterator[float]:
     """Places of the lines of one channel along its time alone, each part with its own phase, the
-    strongest first.
+    strongest first. searches: that are made like this one, all counted.
     """
     without_trend = [p.with_values(p.detrended(p.values)) for p in parts]
     channel = _Channel("", [_Part(0, p) for p in without_trend], ("time",))
-    sure = float(np.log(TUNING.orders.level / channel.places["time"].count))
+    sure = float(np.log(TUNING.orders.level / searches / channel.places["time"].count))
     for _ in range(TUNING.orders.most_lines):
         chance, place = channel.strongest("time", sure)
         if chance > sure:

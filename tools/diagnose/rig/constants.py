@@ -8,6 +8,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Calibration, ConfiguredEffect, Settings, Uncertain
 from gritd.estimator.effects import EFFECTS
+from gritd.tools.cli.wording import percent
 from gritd.tools.diagnose.rig.interface import HAD, Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
@@ -116,7 +117,7 @@ def raised_to_floors(settings: Settings) -> str:
     return (
         f"The configuration states {', '.join(raised)} more exactly than any soil is known."
         " The standard deviations are taken as"
-        f" {', '.join(f'{name} {floors[name]:.0%}' for name in raised)}."
+        f" {', '.join(f'{name} {percent(floors[name])}' for name in raised)}."
     )
 
 

@@ -81,7 +81,7 @@ class RigTuning:
 
     # --- form.py ---
 
-    # --- load_error.py ---
+    # --- motion_error.py ---
     other_weights: float = tuned(
         0.25, "-", "relative distance from a run's level: beyond it, other weights hang on the axle"
     )
@@ -116,7 +116,7 @@ class RigTuning:
     rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
     lifted: float = tuned(0.2, "-", "of the stated or least load: below it the wheel is lifted")
 
-    # --- unrest.py ---
+    # --- motion_error.py, noise/estimate.py ---
     unrest_values: int = tuned(61, "values", "whose median is the speed of a held condition")
     unrest_most: float = tuned(7.5, "times", "the usual unrest: beyond, the motion changes")
     unrest_largest: float = tuned(0.03, "-", "usual unrest: more is no noise of a speed sensor")

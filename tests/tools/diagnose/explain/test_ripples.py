@@ -29,7 +29,7 @@ def _rig(
 def test_a_ripple_without_a_name_is_told_with_its_channels() -> None:
     rig = _rig((_line("torque", "angle", 15.0), _line("sinkage", "angle", 15.05)))
     (sentence,) = left_over(rig, ())
-    assert "15.00 times a turn, 1.0 to 2.0 Hz (torque ± 0.5 N·m, sinkage ± 0.5 m)" in sentence
+    assert "15.00 times a turn, 1.0 to 2.0 Hz (torque ± 0.50 N·m, sinkage ± 500 mm)" in sentence
 
 
 def test_an_accepted_effect_has_its_ripple() -> None:
@@ -43,7 +43,7 @@ def test_an_accepted_effect_has_its_ripple() -> None:
 def test_vibrations_and_what_the_reference_has_are_kept_apart() -> None:
     rig = _rig((_line("load", "time", 7.3), _line("torque", "angle", 9.0)),
                (_line("torque", "angle", 9.0),))  # fmt: skip
-    assert [s for s in left_over(rig, ()) if "7.30 Hz (load ± 0.5 N)" not in s] == []
+    assert [s for s in left_over(rig, ()) if "7.30 Hz (load ± 0.50 N)" not in s] == []
     told = {r.along: r for r in ripples_of(rig)}
     assert told["1/turn"].reference and not told["Hz"].reference
     assert json.loads(json.dumps(plain(vars(told["Hz"]))))["harmonic_of"] is None

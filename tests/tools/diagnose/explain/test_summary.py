@@ -34,7 +34,7 @@ def test_it_begins_with_the_place_and_the_error_on_unseen_runs_before_and_after(
     told = summary(_decision("explained", "a"), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
     place, _, names = told.partition(";")
     assert place.startswith(PLACE.where)
-    assert names.index("0.3") < names.index("0.02") < names.index("90%")
+    assert names.index("0.3") < names.index("0.02") < names.index("90 %")
 
 
 def test_a_channel_that_is_foretold_worse_comes_first() -> None:
@@ -58,14 +58,14 @@ def test_an_effect_that_must_be_bent_far_is_said_to_resemble() -> None:
     resembled = Resembled("torque_constant_error", 0.42, 0.4)
     decision = _decision("unlisted", resembled=(resembled,))
     told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
-    assert "resembles torque_constant_error" in told and "42%" in told and "40%" in told
+    assert "resembles torque_constant_error" in told and "42 %" in told and "40 %" in told
 
 
 def test_several_that_are_likely_together_but_not_alone_are_told() -> None:
     likely = {"b": 0.26, "a": 0.3, "c": 0.17, "d": 0.01}
     decision = _decision("unlisted", probability=likely, unlisted=0.31)
     told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
-    assert "a, b, c" in told and "73%" in told and "31%" in told
+    assert "a, b, c" in told and "73 %" in told and "31 %" in told
     alone = _decision("unlisted", probability={"a": 0.3, "b": 0.01}, unlisted=0.69)
     assert "No listed effect" in summary(alone, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.load_error import changes_of, error_of_level
+from gritd.tools.diagnose.rig.motion_error import changes_of, error_of_level
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening

@@ -19,8 +19,8 @@ from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.motion_error import unrest_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.unrest import unrest_of
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings

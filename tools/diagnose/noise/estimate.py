@@ -150,7 +150,7 @@ def calmer(
     than they are found to. A difference of two torques is no quieter than the motor's alone.
     """
     stack = noise.stack
-    if np.count_nonzero(idle) < TUNING.noise.cell_values:
+    if np.count_nonzero(idle) < 2 * TUNING.noise.cell_values:  # as of two conditions
         return noise
     step = step_of(stack.gaps)
     sized, weight = _posterior(stack, "torque", residual, explainable, cells, before, idle)

@@ -44,6 +44,7 @@ from gritd.tools.diagnose.method import OF_REFERENCE
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
+NUMBERS = re.compile(r"\[\n[\s\d.,eEnul+-]*\]")  # a list of them, which takes one line
 # step -> share of the time that is over when it begins: three campaigns of 7 to 16 s
 DONE_BEFORE = {
     "screening every effect": 0.25,
@@ -254,7 +255,8 @@ def _write(
     with os_errors():
         if arguments.json is not None:
             written = json.dumps(diagnosis.to_json(), ensure_ascii=False, indent=1) + "\n"
-            arguments.json.write_text(written, encoding="utf-8")
+            short = NUMBERS.sub(lambda each: " ".join(each[0].split()), written)
+            arguments.json.write_text(short, encoding="utf-8")
         if arguments.report is not None:
             importlib.import_module("gritd.tools.report.diagnosis").write(
                 diagnosis, arguments.report

@@ -33,7 +33,7 @@ def wheel_forms(
     if usual is None:
         return ()
 
-    conditions = tuple(_conditions(run, usual, radius) for run in runs)
+    conditions = tuple(conditions_in(run, usual, radius) for run in runs)
     forms = []
     for name, both, signed in SOURCES:
         lost = ("torque",) if driven is not None else ()
@@ -68,7 +68,8 @@ def usual_of(runs: Sequence[GridRun]) -> Usual | None:
     )
 
 
-def _conditions(run: GridRun, usual: Usual, radius: float) -> Array:
+def conditions_in(run: GridRun, usual: Usual, radius: float) -> Array:
+    """Conditions (n, d) of δ in a run."""
     known = run.covariates
     travel = radius * known["rolled"]
     return conditions_of(

@@ -12,9 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from gritd.estimator.model.correction import Correction, weights_of
-from gritd.estimator.model.discrepancy import conditions_of, features_of
+from gritd.estimator.model.discrepancy import features_of
 from gritd.estimator.model.learnt import CHANNELS, LearntForm
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.form import conditions_in
 from gritd.tools.diagnose.rig.interface import Channels, GridRun, Held
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -32,8 +33,12 @@ def held_form(
         if (name := "torque" if c == "axle_torque" else c) in CHANNELS
         and not (lost and c == "torque")
     }
-    told = [_told(run, radius, correction) for run in runs]
-    conditions, weights = (np.vstack(each) for each in zip(*told, strict=True))
+    usual = correction.usual
+    conditions = np.vstack([conditions_in(run, usual, radius) for run in runs])
+    known = [run.covariates for run in runs]
+    weights = np.vstack(
+        [weights_of(of["load"], of["speed"], of["direction"], usual) for of in known]
+    )
     at = correction.at(conditions, weights)
     ends = np.cumsum([0, *(run.time.size for run in runs)])
 
@@ -66,14 +71,3 @@ def _rest(
     prior = features_of(conditions[far], TUNING.fit.form_features, TUNING.fit.form_left_out)
     outside = np.where(far[:, None], prior.at(conditions) * open_[:, None], 0.0)
     return np.hstack((learnt, outside)) * (weights * size)[:, None]
-
-
-def _told(run: GridRun, radius: float, correction: Correction) -> tuple[Array, Array]:
-    """Conditions (n, d) and weights (n, 3) of a run."""
-    known = run.covariates
-    travel = radius * known["rolled"]
-    conditions = conditions_of(
-        known["slip"], known["load"], known["speed"], known["direction"], travel, correction.usual
-    )
-    weights = weights_of(known["load"], known["speed"], known["direction"], correction.usual)
-    return conditions, weights

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.cli.wording import percent
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.rig.signals import sha256
 from gritd.tools.diagnose.rig.wheel import Bed
@@ -71,7 +72,7 @@ def with_reference(diagnosis: Diagnosis, reference: Given) -> Diagnosis:
     if kept.covered < WELL:
         caveats = (
             *caveats,
-            f"{kept.covered:.0%} of the new campaign lies where the reference was driven;"
+            f"{percent(kept.covered)} of the new campaign lies where the reference was driven;"
             f" outside: {kept.outside}. What is said of the rest is less certain.",
         )
     return replace(diagnosis, reference=kept, caveats=caveats)

@@ -33,7 +33,7 @@ from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.summary import summary
 from gritd.tools.diagnose.explain.traces import scatters, traces
-from gritd.tools.diagnose.explain.wording import described, label
+from gritd.tools.diagnose.explain.wording import OSCILLATES, described, label
 from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
@@ -75,7 +75,7 @@ def explain(
         fit=fit,
         law=_told(law, after, soil, rig) if law else None,
         next_experiment=proposed,
-        caveats=_caveats(problem, accepted, whole, redo, search.failed),
+        caveats=_caveats(problem, accepted, whole, redo, search.failed, location),
         share=decision.share,
         remaining=left,
         remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),
@@ -256,6 +256,7 @@ def _caveats(
     whole: Model,
     redo: Mapping[str, Any],
     failed: Sequence[Sequence[str]],
+    location: Sequence[Location],
 ) -> tuple[str, ...]:
     """Sentences on what to doubt; whole: the accepted model with unexplained terms; failed:
     effects that no fit was had of.
@@ -281,7 +282,7 @@ def _caveats(
         *sentences,
         *rig.words.shortcomings,
         *doubts(rig, whole, problem.noise),
-        *left_over(rig, acting),
+        *left_over(rig, acting, {x.channel for x in location if OSCILLATES in x.where}),
     )
 
 

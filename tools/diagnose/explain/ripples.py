@@ -4,7 +4,7 @@ name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.tools.cli.wording import shown, spaced, spelled
@@ -37,9 +37,9 @@ def _told(rig: Rig, line: SpectralLine) -> Ripple:
     )
 
 
-def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
+def left_over(rig: Rig, accepted: Sequence[Effect], told: Collection[str] = ()) -> Iterator[str]:
     """Sentences for new ripples that no accepted effect has, for vibrations, and where ripples
-    aligned the runs.
+    aligned the runs. told: channels that are said to oscillate in time already.
     """
     if rig.lines.aligned:
         yield (
@@ -51,7 +51,7 @@ def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
     ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
     if ripples:
         yield f"The wheel ripples, and no accepted effect does: {_listed(rig, ripples)}."
-    if vibrations := rig.lines.fresh("time"):
+    if vibrations := [x for x in rig.lines.fresh("time") if x.channel not in told]:
         yield f"The recordings vibrate, whatever the speed: {_listed(rig, vibrations)}."
 
 

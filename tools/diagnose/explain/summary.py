@@ -110,10 +110,10 @@ def _beside(decision: Decision) -> Iterator[str]:
 def _unexplained(decision: Decision) -> str:
     """That no effect is named; where some are likely together but none alone, which."""
     chances = sorted(decision.probability.items(), key=lambda item: -item[1])
-    least = chances[0][1] * np.exp(-TUNING.verdict.alike) if chances else 0.0
-    alike = {name: chance for name, chance in chances if chance > least}
+    best = chances[0][1] if chances else 0.0
+    alike = {name: p for name, p in chances if p > best * np.exp(-TUNING.verdict.alike)}
     together = sum(alike.values())
-    if len(alike) < 2 or together <= decision.unlisted:
+    if len(alike) < 2 or not best <= decision.unlisted < together:
         return "No listed effect explains it."
     return (
         f"One of {', '.join(alike)} is there with {percent(together)}, but none of these alone is"

@@ -42,6 +42,7 @@ AT = {  # a value of a covariate, in words
 }
 PLACES = {"time": "over time", "position": "along the bed"}
 TIMES = {1: "once", 2: "twice"}
+OSCILLATES = "oscillates with a period of"
 
 
 def label(candidate: Candidate) -> str:
@@ -145,7 +146,7 @@ def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
         return f"ripples {TIMES.get(int(turns), f'{turns:.4g} times')} a turn, {amplitude}"
     length = _length(stack, axis, 1.0 / at)
     if axis == "time":
-        return f"oscillates with a period of {length}, {amplitude}"
+        return f"{OSCILLATES} {length}, {amplitude}"
     return f"waves of {length} along the bed, {amplitude}"
 
 
@@ -263,7 +264,7 @@ class _Told:
 
         far = sorted(means, key=lambda name: -abs(means[name]))[: TUNING.explain.shown]
         each = [f"{_brief(self._say(means[name]))} in {name}" for name in means if name in far]
-        most = "from run to run" if len(far) == len(means) else "most"
+        most = "from run to run" if len(far) == len(means) else "above all"
         return f"{most}: {listed(each)} than the model"
 
     def directions(self) -> str:

@@ -6,11 +6,14 @@ from gritd.estimator.recording.message_records import Starts
 
 Steps = tuple[tuple[int, int, int], ...]
 
+def chunks(
+    data: memoryview, origin: int, most: int, indexes: int, /
+) -> list[tuple[int, int, int, int, int]]: ...
 def walk(
-    content: bytes, ends: Starts, sizes: Starts, /
-) -> tuple[bytes, bytes, bytes, bytes, dict[int, int]] | None: ...
+    content: bytes | memoryview, ends: Starts, sizes: Starts, /
+) -> tuple[bytes, bytes, bytes, dict[int, tuple[int, int, int]], bool] | None: ...
 def fill(
-    content: bytes,
+    content: bytes | memoryview,
     starts: Starts,
     own: Starts,
     rows: NDArray[Any],

@@ -7,23 +7,21 @@ Every length is held against the lengths inside its record before it is believed
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import BinaryIO
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO, NamedTuple
 
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
+from gritd.estimator.compiled.arithmetic import integer_sum
 from gritd.estimator.compiled.records import crc32
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.message_records import (
-    MESSAGE_DTYPE,
     MESSAGE_HEAD,
     RECORD_HEAD,
     Starts,
-    gather,
 )
 
 MAX_WINDOW = 64 << 20  # [bytes] that unpacking may look back
@@ -34,8 +32,7 @@ class Damaged(Exception):
     """A record or a chunk that cannot be trusted; the message says why."""
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(NamedTuple):
     """Records of messages and their definitions: a chunk, or a run of unchunked records
     (compression "", crc 0).
     """
@@ -45,10 +42,7 @@ class Block:
     size: int  # how many they are unpacked
     crc: int  # of the unpacked bytes; 0: the writer gave none
     compression: str
-    index: tuple[int, int] = (
-        0,
-        0,
-    )  # its message index in the file; under no checksum, so only a hint
+    indexes: tuple[int, int] = (0, 0)  # where they stand in the file; under no checksum: a hint
 
 
 class Texts:
@@ -91,46 +85,76 @@ class Texts:
             raise Damaged("the record is longer than its fields")
 
 
-class Unpacker:
-    """Unpacks block after block with one zstd context, which costs as much as a small block, and
-    reads them into one piece of memory.
+class Room:
+    """One piece of memory that is used again and again: new memory comes page by page, which takes
+    as long as unpacking into it.
     """
 
     def __init__(self) -> None:
-        self._packed = bytearray()
-        self._zstd = zstandard.ZstdDecompressor(max_window_size=MAX_WINDOW)
-        self._largest = int(limits().chunk)
+        self._bytes = bytearray()
+
+    def of(self, size: int) -> memoryview:
+        """So many bytes, until the next call."""
+        if len(self._bytes) < size:
+            self._bytes = bytearray(1 << (size - 1).bit_length())  # seldom again
+        return memoryview(self._bytes)[:size]
 
     def read(self, file: BinaryIO, start: int, size: int) -> memoryview:
         """`size` bytes of the file from `start` on, or as many as there are; until the next
         call.
         """
-        if len(self._packed) < size:
-            self._packed = bytearray(1 << size.bit_length())  # seldom again
-        view = memoryview(self._packed)[:size]
+        view = self.of(size)
         return view[: os.preadv(file.fileno(), [view], start)]
 
-    def whole(self, block: Block, data: memoryview) -> bytes | None:
-        """The records of a block from its stored bytes, its checksum verified; None where it is not
-        as it should be, and `unpack` says why.
+
+class Unpacker:
+    """Reads and unpacks block after block with one zstd context, which costs as much as a small
+    block. `last`: what it unpacked is needed no longer when it unpacks more.
+    """
+
+    def __init__(self, last: bool = False) -> None:
+        self.last = last
+        self._packed, self._content = Room(), Room()
+        self._zstd = zstandard.ZstdDecompressor(max_window_size=MAX_WINDOW)
+        self._largest = int(limits().chunk)
+
+    def joined(self, file: BinaryIO, blocks: Sequence[Block]) -> memoryview | None:
+        """The records of neighbouring blocks end to end, their checksums verified; None where one
+        is not as it should be, and `unpack` says why.
         """
-        if too_large(block, self._largest) or len(data) != block.stored:
+        if any(too_large(block, self._largest) for block in blocks):
             return None
+        start = min(block.start for block in blocks)  # an index may list them in any order
+        stored = self._packed.read(file, start, max(b.start + b.stored for b in blocks) - start)
+        size = integer_sum(block.size for block in blocks)
+        content = self._content.of(size) if self.last else memoryview(bytearray(size))
 
-        try:
-            content = self._content(block, data)
-        except (Damaged, zstandard.ZstdError):
-            return None
-
-        if len(content) != block.size or (block.crc and crc32(content) != block.crc):
-            return None
+        end = 0
+        for block in blocks:
+            begin, end = end, end + block.size
+            data = stored[block.start - start : block.start - start + block.stored]
+            if not self._into(content[begin:end], block, data):
+                return None
         return content
 
-    def _content(self, block: Block, data: memoryview) -> bytes:
-        # what a frame says of its size is taken at its word and allocated
-        if block.compression == "zstd" and zstandard.frame_content_size(data) == block.size:
-            return self._zstd.decompress(data)
-        return _decompress(block, bytes(data))
+    def _into(self, room: memoryview, block: Block, data: memoryview) -> bool:
+        """Whether a block was unpacked, as its head says, into room of its size."""
+        if len(data) != block.stored:
+            return False
+
+        try:
+            # what a frame says of its size is taken at its word
+            if block.compression == "zstd" and zstandard.frame_content_size(data) == block.size:
+                with self._zstd.stream_reader(data) as reader:
+                    size = reader.readinto(room)
+            else:
+                content = _decompress(block, bytes(data))
+                size = len(content)
+                room[:] = content[: len(room)]
+        except (Damaged, zstandard.ZstdError, ValueError):
+            return False
+
+        return size == block.size and (not block.crc or crc32(room) == block.crc)
 
 
 def too_large(block: Block, largest: int) -> str:
@@ -177,26 +201,10 @@ def _decompress(block: Block, data: bytes) -> bytes:
     return data
 
 
-def split(
-    file: BinaryIO, block: Block, content: bytes
-) -> tuple[Starts, list[tuple[int, int, int]]]:
+def split(content: bytes) -> tuple[Starts, list[tuple[int, int, int]]]:
     """Where the message records begin in an unpacked block, shape (n,), and its definitions
-    (opcode, start, end).
-
-    The message index saves walking the records, but only if the messages it names are proven to lie
-    end to end from the last definition to the end of the block. Raises Damaged where the records do
-    not tile it.
+    (opcode, start, end). Raises Damaged where the records do not tile it.
     """
-    hint = _indexed(file, block)
-    if hint.size and _tile(content, hint):
-        before = list(records(content, int(hint[0])))
-        if all(opcode in (Opcode.SCHEMA, Opcode.CHANNEL) for opcode, _, _ in before):
-            return hint, before
-
-    return _walked(content)
-
-
-def _walked(content: bytes) -> tuple[Starts, list[tuple[int, int, int]]]:
     starts, definitions = [], []
     for opcode, start, end in records(content):
         if opcode == Opcode.MESSAGE and end - start >= MESSAGE_HEAD.size - RECORD_HEAD.size:
@@ -206,40 +214,6 @@ def _walked(content: bytes) -> tuple[Starts, list[tuple[int, int, int]]]:
         else:
             raise Damaged(f"holds a record of opcode 0x{opcode:02x} and {end - start} bytes")
     return np.array(starts, np.int64), definitions
-
-
-def _tile(content: bytes, starts: Starts) -> bool:
-    """Whether messages, and nothing else, lie end to end from the first of these to the end."""
-    if starts[0] < 0 or starts[-1] + MESSAGE_HEAD.size > len(content):
-        return False
-
-    heads = gather(content, starts, MESSAGE_DTYPE)
-    ends = starts + RECORD_HEAD.size + heads["length"].astype(np.int64)
-    long_enough = heads["length"] >= MESSAGE_HEAD.size - RECORD_HEAD.size
-
-    return bool(
-        np.all(heads["opcode"] == Opcode.MESSAGE)
-        and np.all(long_enough)
-        and np.array_equal(ends[:-1], starts[1:])
-        and ends[-1] == len(content)
-    )
-
-
-def _indexed(file: BinaryIO, block: Block) -> Starts:
-    """Where the message index says that messages begin, sorted. Empty if there is none."""
-    first, end = block.index
-    if not 0 < end - first <= limits().chunk:
-        return np.empty(0, np.int64)
-
-    file.seek(first)
-    data = file.read(end - first)
-    starts = []
-    for _, start, stop in records(data):
-        starts.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
-
-    return np.sort(
-        np.concatenate(starts).astype(np.int64)
-    )  # one that is too large becomes negative, and stands first
 
 
 def records(data: bytes, stop: int | None = None) -> Iterator[tuple[int, int, int]]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from mcap.records import Channel, Schema
+from numpy.typing import NDArray
 
 from gritd.estimator.recording.cdr import Codec, Rows, Topic
 from gritd.estimator.recording.message_records import (
@@ -67,22 +68,28 @@ class RecordedChannel:
 
 @dataclass(frozen=True)
 class MessageHeads:
-    """The good messages of one block: where their records begin in `content`, and their heads,
-    shape (n,).
+    """The good messages of one block: where their records begin in `content`, shape (n,).
 
-    known: `groups`, where they are known already.
+    known: `groups`, where they are known already; times: log times in the place of the file's [ns].
     """
 
-    content: bytes
+    content: bytes | memoryview
     starts: Starts
-    heads: Rows
     known: dict[int, Starts] | None = None
+    times: NDArray[np.int64] | None = None
+
+    @cached_property
+    def heads(self) -> Rows:
+        """Shape (n,)."""
+        heads = gather(self.content, self.starts, MESSAGE_DTYPE)
+        if self.times is not None:
+            heads["log_time"] = self.times
+        return heads
 
     def body(self, i: int) -> bytes:
         start = int(self.starts[i])
-        return self.content[
-            start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])
-        ]
+        end = start + RECORD_HEAD.size + int(self.heads["length"][i])
+        return bytes(self.content[start + MESSAGE_HEAD.size : end])
 
     def records(self) -> tuple[bytes, Starts]:
         """The message records, heads included, end to end, and the byte offset where each begins,
@@ -109,7 +116,7 @@ def select(
     """The messages that are of a known channel and as long as its fields, and one line for each
     kind of others. starts: byte offsets of the records in `content`, shape (n,).
     """
-    whole = MessageHeads(content, starts, gather(content, starts, MESSAGE_DTYPE))
+    whole = MessageHeads(content, starts)
 
     good = np.zeros(starts.shape, bool)
     complaints = []
@@ -124,9 +131,7 @@ def select(
             )
             complaints.append(f"{bad} messages skipped: they {what}")
 
-    return (
-        whole if good.all() else MessageHeads(content, starts[good], whole.heads[good])
-    ), complaints
+    return whole if good.all() else MessageHeads(content, starts[good]), complaints
 
 
 def sound(chunk: MessageHeads, own: Starts, source: RecordedChannel) -> Any:

@@ -39,7 +39,7 @@ class _Glance(RecordingCheck):
         first = next(walk.blocks(), None)  # what stands before it is metadata
 
         if first is not None:
-            after = max(first.index[1], first.start + first.stored)
+            after = max(first.indexes[1], first.start + first.stored)
             for block in chain((first,), walk.spread(chunks, after)):
                 with suppress(Damaged):
                     self._block(file, block)

@@ -23,7 +23,7 @@ Starts = NDArray[np.int64]
 
 
 def gather(
-    content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]
+    content: bytes | bytearray | memoryview, starts: Starts, dtype: np.dtype[np.void]
 ) -> NDArray[np.void]:
     """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy,
     shape (n,).

@@ -21,7 +21,8 @@ from mcap.opcode import Opcode
 
 from gritd.estimator.compiled import records
 from gritd.estimator.limits import limits
-from gritd.estimator.recording.blocks import Block, Unpacker
+from gritd.estimator.recording.blocks import Block, Damaged, Unpacker
+from gritd.estimator.recording.blocks import records as records_of
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.decoding import CDR_LE, PADDING, MessageHeads, RecordedChannel, sound
 from gritd.estimator.recording.message_records import (
@@ -31,6 +32,7 @@ from gritd.estimator.recording.message_records import (
     Starts,
     gather,
 )
+from gritd.estimator.recording.sequence import Ranges, ranges, rising
 
 ROOM = 1 << 20  # [bytes] of a pile, unpacked
 REACH = 4 << 20  # [bytes] of the file that it may lie in
@@ -42,10 +44,10 @@ _HEAD = np.dtype(  # of a message, with the first two bytes of its CDR
         "itemsize": MESSAGE_HEAD.size + 2,
     }
 )
-_INDEX_HEAD = 15  # [bytes] of a message index before its entries
 _ENTRY = 16  # [bytes] log_time and offset
 
-Ranges = dict[int, tuple[int, int, int]]  # channel -> first number, last number, messages
+
+_Joined = tuple[MessageHeads, Starts, Ranges, bool]
 
 
 class Pile(NamedTuple):
@@ -54,37 +56,22 @@ class Pile(NamedTuple):
     chunk: MessageHeads  # of all of them
     cuts: Starts  # (blocks + 1,) the number of the first message of each block, and how many
     preambles: tuple[bytes, ...]  # (blocks) what stands before the messages of each
+    numbers: Ranges
 
     def parts(self) -> list[MessageHeads]:
         """The messages block by block."""
         if len(self.cuts) == 2:
             return [self.chunk]
-        edges = self.cuts.tolist()
-        content, starts, heads = self.chunk.content, self.chunk.starts, self.chunk.heads
-        return [MessageHeads(content, starts[a:b], heads[a:b]) for a, b in pairwise(edges)]
-
-    def ranges(self) -> list[Ranges]:
-        """The messages' numbers in each block, channel by channel."""
-        numbers, groups = self.chunk.heads["sequence"], self.chunk.groups
-        if len(self.cuts) == 2:
-            ends = {c: (int(numbers[own[0]]), int(numbers[own[-1]])) for c, own in groups.items()}
-            return [{c: (*ends[c], len(own)) for c, own in groups.items()}]
-
-        of_blocks: list[Ranges] = [{} for _ in range(len(self.cuts) - 1)]
-        block = np.repeat(np.arange(len(of_blocks)), np.diff(self.cuts))
-        for channel, own in groups.items():
-            last = np.append(np.flatnonzero(np.diff(block[own])), len(own) - 1)
-            first = np.append(0, last[:-1] + 1)
-            columns = (block[own[last]], numbers[own[first]], numbers[own[last]], last - first + 1)
-            for at, begin, end, count in zip(*(c.tolist() for c in columns), strict=True):
-                of_blocks[at][channel] = begin, end, count
-
-        return of_blocks
+        content, starts, times = self.chunk.content, self.chunk.starts, self.chunk.times
+        return [
+            MessageHeads(content, starts[a:b], times=None if times is None else times[a:b])
+            for a, b in pairwise(self.cuts.tolist())
+        ]
 
 
 def alone(chunk: MessageHeads) -> Pile:
     """A pile of one block."""
-    return Pile(chunk, np.array([0, len(chunk.starts)]), ())
+    return Pile(chunk, np.array([0, len(chunk.starts)]), (), ranges(chunk))
 
 
 def opened(
@@ -92,27 +79,33 @@ def opened(
     blocks: Sequence[Block],
     sources: Mapping[int, RecordedChannel],
     unpacker: Unpacker,
+    numbered: bool = False,
 ) -> Pile | None:
     """The messages of neighbouring blocks; None where anything about one of them is not as it
-    should be, or its writer left no message index.
+    should be, or nothing is compiled and its writer left no message index. numbered: each message
+    should have a later number than the one of its channel before it.
     """
-    contents, indexes = _unpacked(file, blocks, unpacker)
-    if len(contents) < len(blocks) or not indexes:
+    reach = max(b.start + b.stored for b in blocks) - min(b.start for b in blocks)
+    if reach > 2 * max(int(limits().chunk), REACH):
+        return None
+    content = unpacker.joined(file, blocks)
+    if content is None:
         return None
 
-    content = contents[0] if len(contents) == 1 else b"".join(contents)
-    ends = np.cumsum([len(each) for each in contents])
+    ends = np.cumsum([block.size for block in blocks])
     joined = (
         _walked(content, ends, sources)
         if records.BUILT
-        else _pointed(content, ends, indexes, sources)
+        else _pointed(content, ends, _indexes(file, blocks), sources)
     )
     if joined is None:
         return None
 
-    chunk, cuts = joined
-    begins = (chunk.starts[cuts[:-1]] - _bases(ends)).tolist()
-    return Pile(chunk, cuts, tuple(c[:b] for c, b in zip(contents, begins, strict=True)))
+    chunk, cuts, numbers, in_order = joined
+    if numbered and not in_order:
+        return None
+    edges = zip(_bases(ends).tolist(), chunk.starts[cuts[:-1]].tolist(), strict=True)
+    return Pile(chunk, cuts, tuple(bytes(content[a:b]) for a, b in edges), numbers)
 
 
 def _bases(ends: Starts) -> Starts:
@@ -121,10 +114,10 @@ def _bases(ends: Starts) -> Starts:
 
 
 def _walked(
-    content: bytes, ends: Starts, sources: Mapping[int, RecordedChannel]
-) -> tuple[MessageHeads, Starts] | None:
-    """The messages of joined blocks that end at `ends`, and the cuts between them, by walking from
-    head to head.
+    content: memoryview, ends: Starts, sources: Mapping[int, RecordedChannel]
+) -> _Joined | None:
+    """The messages of joined blocks that end at `ends`, the cuts between them, their numbers and
+    whether these rise, by walking from head to head.
     """
     sizes = np.full(max(sources, default=0) + 1, records.UNKNOWN, np.int64)
     for channel, source in sources.items():
@@ -135,26 +128,24 @@ def _walked(
     if walked is None:
         return None
 
-    starts, heads, cuts, numbers, counts = walked
-    order = np.frombuffer(numbers, np.int64)
-    edges = pairwise(accumulate(counts.values(), initial=0))
-    groups = {channel: order[a:b] for channel, (a, b) in zip(counts, edges, strict=True)}
-    chunk = MessageHeads(
-        content, np.frombuffer(starts, np.int64), np.frombuffer(heads, _HEAD), groups
-    )
+    starts, cuts, places, numbers, in_order = walked
+    order = np.frombuffer(places, np.int64)
+    edges = pairwise(accumulate((count for _, _, count in numbers.values()), initial=0))
+    groups = {channel: order[a:b] for channel, (a, b) in zip(numbers, edges, strict=True)}
+    chunk = MessageHeads(content, np.frombuffer(starts, np.int64), groups)
 
     loose = (channel for channel in groups if sizes[channel] == records.NOT_FIXED)
     if not all(np.all(sound(chunk, groups[channel], sources[channel])) for channel in loose):
         return None
-    return chunk, np.frombuffer(cuts, np.int64)
+    return chunk, np.frombuffer(cuts, np.int64), numbers, in_order
 
 
 def _pointed(
-    content: bytes,
+    content: memoryview,
     ends: Starts,
-    indexes: Sequence[tuple[int, memoryview]],
+    indexes: Sequence[tuple[int, bytes]],
     sources: Mapping[int, RecordedChannel],
-) -> tuple[MessageHeads, Starts] | None:
+) -> _Joined | None:
     """The same, where the message indexes point to."""
     bases = _bases(ends)
     starts = _starts(indexes, bases, len(content))
@@ -168,11 +159,11 @@ def _pointed(
     if not _tiled(starts, heads, cuts, ends):
         return None
 
-    chunk = MessageHeads(content, starts, heads)
-    return (chunk, cuts) if _sound(chunk, sources) else None
+    chunk = MessageHeads(content, starts)
+    return (chunk, cuts, ranges(chunk), rising(chunk)) if _sound(chunk, heads, sources) else None
 
 
-def _sound(chunk: MessageHeads, sources: Mapping[int, RecordedChannel]) -> bool:
+def _sound(chunk: MessageHeads, heads: Rows, sources: Mapping[int, RecordedChannel]) -> bool:
     """Whether every message is of a known channel and fits its fields: `decoding.sound` of all
     channels at once.
     """
@@ -187,46 +178,32 @@ def _sound(chunk: MessageHeads, sources: Mapping[int, RecordedChannel]) -> bool:
         elif not np.all(sound(chunk, own, sources[channel])):
             return False
 
-    expected = size[chunk.heads["channel"]]
-    excess = chunk.heads["length"].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size)
+    expected = size[heads["channel"]]
+    excess = heads["length"].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size)
     excess -= expected
-    fits = (excess >= 0) & (excess <= PADDING) & (chunk.heads["kind"] == CDR_LE)
+    fits = (excess >= 0) & (excess <= PADDING) & (heads["kind"] == CDR_LE)
     return bool(np.all(fits | (expected < 0)))
 
 
-def _unpacked(
-    file: BinaryIO, blocks: Sequence[Block], unpacker: Unpacker
-) -> tuple[list[bytes], list[tuple[int, memoryview]]]:
-    """The blocks' records, as far as they unpack; and (number of the block, entries) of every
-    message index, none where one cannot be read.
-    """
-    origin = min(block.start for block in blocks)  # an index may list them in any order
-    reach = max(max(b.start + b.stored, b.index[1]) for b in blocks) - origin
-    if reach > 2 * max(int(limits().chunk), REACH):
-        return [], []
-    packed = unpacker.read(file, origin, reach)
-
-    contents, indexes = list[bytes](), list[tuple[int, memoryview]]()
+def _indexes(file: BinaryIO, blocks: Sequence[Block]) -> list[tuple[int, bytes]]:
+    """(number of the block, entries) of every message index, none where one cannot be read."""
+    indexes = list[tuple[int, bytes]]()
     for number, block in enumerate(blocks):
-        start = block.start - origin
-        content = unpacker.whole(block, packed[start : start + block.stored])
-        first, end = (place - origin for place in block.index)
-        if content is None or not 0 < first < end <= len(packed):
-            break
-        contents.append(content)
-        while first < end:
-            if first + _INDEX_HEAD > end:
-                return contents, []
-            after = first + RECORD_HEAD.size + RECORD_HEAD.unpack_from(packed, first)[1]
-            if after > end:
-                return contents, []
-            indexes.append((number, packed[first + _INDEX_HEAD : after]))
-            first = after
+        first, end = block.indexes
+        file.seek(first)
+        data = file.read(min(end - first, int(limits().chunk)))
+        try:
+            found = [data[start + 6 : stop] for _, start, stop in records_of(data)]
+        except Damaged:
+            return []
+        if not found:
+            return []
+        indexes += [(number, entries) for entries in found]
 
-    return contents, indexes
+    return indexes
 
 
-def _starts(indexes: Sequence[tuple[int, memoryview]], bases: Starts, size: int) -> Starts | None:
+def _starts(indexes: Sequence[tuple[int, bytes]], bases: Starts, size: int) -> Starts | None:
     """Where messages begin in the joined blocks (n,), ascending, as the message indexes say; None
     where one points outside.
     """

@@ -165,10 +165,8 @@ class Recording:
             return
         before = 0
         for pile in self._stored():
-            chunk = pile.chunk
-            heads, after = chunk.heads.copy(), before + len(chunk.starts)
-            heads["log_time"] = self._received[before:after]
-            yield pile._replace(chunk=replace(chunk, heads=heads))
+            after = before + len(pile.chunk.starts)
+            yield pile._replace(chunk=replace(pile.chunk, times=self._received[before:after]))
             before = after
 
     def _stored(self) -> Iterator[Pile]:
@@ -185,4 +183,4 @@ class Recording:
 
     def _chunk(self, file: BinaryIO, block: Block) -> MessageHeads:
         content = unpack(file, block)
-        return select(content, split(file, block, content)[0], self.sources)[0]
+        return select(content, split(content)[0], self.sources)[0]

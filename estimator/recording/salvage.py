@@ -32,7 +32,7 @@ from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
 from gritd.estimator.recording.piles import REACH, ROOM, Pile, alone, opened
 from gritd.estimator.recording.received import LogTimes, received
 from gritd.estimator.recording.recording import Message, Recording
-from gritd.estimator.recording.sequence import ChunkSequence as Numbers
+from gritd.estimator.recording.sequence import ChunkSequence, ranges
 from gritd.estimator.recording.tables import NOTHING, Fields, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.recording.walk import Contents, Walk
@@ -144,7 +144,8 @@ class RecordingCheck:
         self._tables = tables
 
         self._unpacker = Unpacker()
-        self._sequence = Numbers()
+        self._sequence = ChunkSequence()
+        self._seen: set[tuple[int, int]] = set()  # sizes and checksums of chunks
         self._times = LogTimes()  # of another writer's file
         self._numbered = False  # its messages are numbered as ours are
         self._preambles: set[bytes] = {b""}  # definitions that are known, as they stand in a chunk
@@ -163,7 +164,7 @@ class RecordingCheck:
         self._expect(expected, walk.size)
         self._tables.begin(recording.sources)
         if self._tables.wanted:  # who has the arrays asks no more
-            self._kept_room = 0
+            self._kept_room, self._unpacker.last = 0, True
 
         for pile in _piles(walk, contents.damage):
             self._numbered = contents.library == LIBRARY
@@ -213,19 +214,16 @@ class RecordingCheck:
         """
         if self._ends_within(blocks):
             return False
-        pile = opened(file, blocks, self._recording.sources, self._unpacker)
+        sources = self._recording.sources
+        pile = opened(file, blocks, sources, self._unpacker, self._numbered)
         if pile is None or not all(map(self._is_known, pile.preambles)):
             return False
 
-        ranges = pile.ranges()
-        if not self._numbered:
-            for each in ranges:
-                self._sequence.add(each)
-        elif not self._sequence.add_all(ranges):
+        if self._numbered and not self._sequence.follows(pile.numbers):
             return False
 
-        for block in blocks:
-            self._count(block)
+        self._sequence.add(pile.numbers)
+        self._count(blocks)
         self._keep(blocks, pile)
         return True
 
@@ -263,7 +261,7 @@ class RecordingCheck:
     def _ending(self, block: Block) -> str:
         """Why nothing is read from here on; '' as a rule."""
         bounds = limits()
-        self._count(block)
+        self._count([block])
         if self._waste > MAX_WASTE:
             return "too much damage"
         if self._unpacked > bounds.start + bounds.ratio * self._stored:
@@ -271,14 +269,16 @@ class RecordingCheck:
         few = FEW * self._chunks > self._messages
         return f"chunks of fewer than {FEW} messages" if self._chunks > SMALL_CHUNKS and few else ""
 
-    def _count(self, block: Block) -> None:
-        self._chunks += 1
-        self._unpacked += block.size
-        self._stored += block.stored + block.index[1] - block.index[0]
+    def _count(self, blocks: Sequence[Block]) -> None:
+        self._chunks += len(blocks)
+        self._unpacked += integer_sum(block.size for block in blocks)
+        self._stored += integer_sum(
+            block.stored + block.indexes[1] - block.indexes[0] for block in blocks
+        )
 
     def _block(self, file: BinaryIO, block: Block) -> None:
         content = unpack(file, block)
-        starts, definitions = split(file, block, content)
+        starts, definitions = split(content)
         for opcode, start, end in definitions:
             self._definitions.add(opcode, content[start:end])
 
@@ -296,17 +296,16 @@ class RecordingCheck:
         """Hold the messages' numbers against those before. Raises Damaged for a chunk that stands
         there twice.
         """
-        (ranges,) = alone(chunk).ranges()
-        if self._numbered and self._sequence.repeated(ranges):
+        numbers = ranges(chunk)
+        if self._numbered and not self._sequence.follows(numbers):
             self._recording.misplaced += 1
-            raise Damaged("it stands there twice")
-
-        if not self._sequence.add(ranges) and self._numbered:
-            self._recording.misplaced += 1
+            if block.crc and (block.size, block.crc) in self._seen:
+                raise Damaged("it stands there twice")
             self._say(
                 f"byte {block.start}: chunk of {block.stored} bytes is not in its place: its"
                 " messages come after later ones"
             )
+        self._sequence.add(numbers)
 
     def _keep(self, blocks: Sequence[Block], pile: Pile) -> None:
         recording, chunk = self._recording, pile.chunk
@@ -322,7 +321,9 @@ class RecordingCheck:
         for channel, own in chunk.groups.items():
             recording.counts[recording.sources[channel].topic.name] += len(own)
         self._tables.add(chunk, recording.sources, self._messages)
-        if not self._numbered:
+        if self._numbered:
+            self._seen.update((block.size, block.crc) for block in blocks)
+        else:
             self._times.add(chunk.heads["log_time"])
         self._messages += len(chunk.starts)
 

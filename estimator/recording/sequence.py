@@ -4,11 +4,15 @@ next. Where it does not, messages are missing, or a chunk stands in another plac
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gritd.estimator.compiled.arithmetic import integer_sum
+import numpy as np
 
+from gritd.estimator.compiled.arithmetic import integer_sum
+from gritd.estimator.recording.decoding import MessageHeads
+
+Ranges = Mapping[int, tuple[int, int, int]]  # channel -> first number, last number, messages
 _WRAP = 1 << 32  # numbers begin again there
 
 
@@ -25,12 +29,24 @@ class _Counted:
         return _ahead(self.last, self.first) + 1 - self.count
 
 
+def ranges(chunk: MessageHeads) -> Ranges:
+    """The messages' numbers, channel by channel."""
+    numbers, groups = chunk.heads["sequence"], chunk.groups
+    return {c: (int(numbers[n[0]]), int(numbers[n[-1]]), len(n)) for c, n in groups.items()}
+
+
+def rising(chunk: MessageHeads) -> bool:
+    """Whether each message has a later number than the one of its channel before it."""
+    numbers = chunk.heads["sequence"]
+    steps = [np.diff(numbers[own]).view(np.int32) for own in chunk.groups.values()]
+    return bool(np.all(np.concatenate(steps) > 0))
+
+
 class ChunkSequence:
     """Follows the chunks of a file in file order."""
 
     def __init__(self) -> None:
         self._channels: dict[int, _Counted] = {}
-        self._seen: set[int] = set()  # chunks, by their numbers
 
     @property
     def missing(self) -> int:
@@ -41,47 +57,20 @@ class ChunkSequence:
         """Messages by channel."""
         return {channel: counted.count for channel, counted in self._channels.items()}
 
-    def repeated(self, chunk: Mapping[int, tuple[int, int, int]]) -> bool:
-        """Whether a chunk (channel → first number, last number, messages) was there before."""
-        key = hash(tuple(chunk.items()))
-        before = key in self._seen
-        self._seen.add(key)
-        return before
+    def follows(self, chunk: Ranges) -> bool:
+        """Whether all channels of a chunk count on from the chunks before."""
+        known = self._channels
+        return all(_ahead(n[0], known[c].last) > 0 for c, n in chunk.items() if c in known)
 
-    def add_all(self, chunks: Iterable[Mapping[int, tuple[int, int, int]]]) -> bool:
-        """Count chunks that all count on from those before and were not there before; False, and
-        nothing is counted, where one does not.
-        """
-        chunks = list(chunks)
-        keys = [hash(tuple(chunk.items())) for chunk in chunks]
-        lasts = {channel: counted.last for channel, counted in self._channels.items()}
-
-        for chunk in chunks:
-            for channel, (first, last, _) in chunk.items():
-                if _ahead(first, lasts.get(channel, first - 1)) <= 0 or _ahead(last, first) < 0:
-                    return False
-                lasts[channel] = last
-        if len(set(keys)) < len(keys) or not self._seen.isdisjoint(keys):
-            return False
-
-        self._seen.update(keys)
-        for chunk in chunks:
-            self.add(chunk)
-        return True
-
-    def add(self, chunk: Mapping[int, tuple[int, int, int]]) -> bool:
-        """Count a chunk; whether all its channels count on from the chunks before."""
-        in_place = True
+    def add(self, chunk: Ranges) -> None:
+        """Count a chunk, or neighbouring ones as one."""
         for channel, (first, last, count) in chunk.items():
             counted = self._channels.setdefault(channel, _Counted(first, first - 1))
-            in_place &= _ahead(first, counted.last) > 0
             if _ahead(last, counted.last) > 0:
                 counted.last = last
             if _ahead(first, counted.first) < 0:
                 counted.first = first
             counted.count += count
-
-        return in_place
 
 
 def _ahead(number: int, other: int) -> int:

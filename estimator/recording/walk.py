@@ -11,14 +11,15 @@ import re
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
 
+from gritd.estimator.compiled import records
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.attachments import AttachmentPlace
-from gritd.estimator.recording.blocks import Block, Damaged, Texts
+from gritd.estimator.recording.blocks import Block, Damaged, Room, Texts
 from gritd.estimator.recording.mcapfile import MAGIC, RecordingError
 from gritd.estimator.recording.message_records import RECORD_HEAD
 
@@ -38,6 +39,8 @@ _CLOSING = _FOOTER.size + len(MAGIC)
 _DATA_END_SIZE = 13
 _STEP = 1 << 20
 _NEAR = 1 << 17  # [bytes] some chunks of an ordinary recording
+_TOGETHER = 1 << 18  # [bytes] of the file that small chunks are looked for in
+_SMALL = 1 << 15  # [bytes] of larger ones the heads alone are read
 _WINDOW = 1 << 13  # [bytes] of the file read at once where records are small
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of the entries
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
@@ -69,6 +72,8 @@ class Walk:
         self._chunks, self._most = 0, limits().chunks
         # the last one, whose message index may follow, and the one before
         self._blocks: list[Block] = []
+        self._room = Room()
+        self._small = records.BUILT  # whether small chunks are looked for together
         self._window, self._window_start = b"", 0  # the part of the file that was read last
         self.contents = Contents()
 
@@ -81,15 +86,32 @@ class Walk:
         """The blocks in file order; what else there is, is in `found` at the end."""
         position: int | None = len(MAGIC)
         while position is not None and position < self._limit:
-            position = self._step(position)
-            if len(self._blocks) > 1:
-                yield self._blocks.pop(0)
+            position = self._several(position) or self._step(position)
+            yield from self._blocks[:-1]
+            del self._blocks[:-1]
             if too_many := self._too_many():
                 line = f"byte {position}: more than {too_many}; the rest is not read"
                 self.contents.damage.append(line)
                 break
 
         yield from self._blocks
+
+    def _several(self, position: int) -> int | None:
+        """The position after small chunks that lie end to end from `position` on; None where there
+        are none, and from where something is not as it should be.
+        """
+        small = self._small and self._blocks and self._blocks[-1].stored < _SMALL
+        if not small or self._read(position, 1)[0] != Opcode.CHUNK:
+            return None
+
+        size, most = min(_TOGETHER, self._limit - position), int(self._most - self._chunks) + 1
+        data = self._room.read(self._file, position, size)
+        found = records.chunks(data, position, most, INDEXES)
+        for start, stored, size, crc, end in found:
+            self._found(Block(start, stored, size, crc, "zstd", (start + stored, end)))
+
+        self._small = bool(found)
+        return found[-1][-1] if found else None
 
     def spread(self, count: int, after: int) -> Iterator[Block]:
         """Chunks near so many places behind `after`, evenly spread over the file, and the last
@@ -112,7 +134,7 @@ class Walk:
         _, length = RECORD_HEAD.unpack(self._read(place, RECORD_HEAD.size))
         start = place + RECORD_HEAD.size
         end = self._indexes(start + length)
-        return replace(self._chunk_head(start, length), index=(start + length, end)), end
+        return self._chunk_head(start, length)._replace(indexes=(start + length, end)), end
 
     def _too_many(self) -> str:
         """What there is more of than a recording has; '' as a rule."""
@@ -219,7 +241,7 @@ class Walk:
         """The position after a chunk and its message indexes."""
         block, end = self._chunk_head(start, length), start + length
         after = self._indexes(end)
-        self._found(replace(block, index=(end, after)) if after > end else block)
+        self._found(block._replace(indexes=(end, after)) if after > end else block)
         return after
 
     def _indexes(self, position: int) -> int:
@@ -257,8 +279,8 @@ class Walk:
             raise Damaged("the lengths of a message index contradict each other")
         if self._blocks:
             last = self._blocks[-1]
-            first = last.index[0] if last.index[1] == position else position
-            self._blocks[-1] = replace(last, index=(first, start + length))
+            first = last.indexes[0] if last.indexes[1] == position else position
+            self._blocks[-1] = last._replace(indexes=(first, start + length))
 
     def _found(self, block: Block) -> None:
         self._blocks.append(block)

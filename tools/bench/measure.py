@@ -53,7 +53,7 @@ Figures = dict[str, float]
 
 @dataclass(frozen=True)
 class BenchSizes:
-    """How much of everything; the defaults take about a minute."""
+    """How much of everything; the defaults take about two minutes."""
 
     seconds: float = 60.0  # of recording
     ticks: int = 5000
@@ -61,7 +61,7 @@ class BenchSizes:
     samples: int = 2000  # forces in a batch
     starts: int = 3  # of a process, for each engine
     simulated: float = 60.0  # [s] for the forward model
-    live: float = 15.0  # [s] of the daemon on simulated wires
+    live: float = 60.0  # [s] of the daemon on simulated wires
     fast: float = 0.0  # [s] of the daemon at FAST; 0 for none
     long: float = 0.0  # [s] of a recording with ticks that is replayed whole; 0 for none
     runs: tuple[int, ...] = ()  # that are diagnosed together
@@ -99,6 +99,9 @@ def measure(sizes: BenchSizes, folder: Path) -> dict[str, Figures]:
         "writing": lambda subject: against.writing(subject.logged, subject.sizes.repeats),
         "start": lambda subject: start(subject.sizes.starts),
         "live": lambda subject: live(subject.sizes.live, folder / "live"),
+        "reading_live": lambda subject: against.reading(
+            next((folder / "live").glob("*.mcap")), subject.sizes.repeats
+        ),
         "forward_model": forward_model,
     }
     if sizes.fast:

@@ -75,17 +75,17 @@ def readers() -> dict[str, Reader]:
 
 
 def unpacking(path: Path) -> Callable[[], object]:
-    """What no reader can leave out: every chunk unpacked from memory, its checksum verified."""
-    data = memoryview(path.read_bytes())
+    """What no reader can leave out: every chunk read and unpacked, its checksum verified."""
     with path.open("rb") as file:
-        walk = Walk(file, len(data))
+        walk = Walk(file, path.stat().st_size)
         walk.begin()
         blocks = list(walk.blocks())
 
     def run() -> None:
-        unpacker = Unpacker()
-        for block in blocks:
-            unpacker.whole(block, data[block.start : block.start + block.stored])
+        unpacker = Unpacker(last=True)
+        with path.open("rb") as file:
+            for block in blocks:
+                assert unpacker.joined(file, [block]) is not None
 
     return run
 

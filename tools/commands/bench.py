@@ -105,6 +105,7 @@ def report(figures: dict[str, Figures]) -> str:
                 for name in ENGINES
             ),
             *_live("live", figures["live"]),
+            *_side_by_side("its file", figures["reading_live"]),
             *_live("live 1 kHz", figures.get("live_at_1_khz", {})),
             f"simulator  {w['speed']:.0f} times real time, "
             f"with six effects {w['speed_with_six_effects']:.0f}",
@@ -196,7 +197,7 @@ def build_parser() -> Parser:
     parser = Parser(
         prog="gritd bench",
         description="What everything costs on this machine, and what others take for the same; "
-        "one or two minutes.",
+        "two or three minutes.",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import struct
 import subprocess
 import sys
 import zlib
@@ -288,9 +289,38 @@ def test_what_is_walked_is_held_against_its_bounds() -> None:
         walked += 1
         starts = np.frombuffer(found[0], np.int64)
         assert end <= len(content) and starts[0] >= 0 and starts[-1] + 33 <= len(content)
-        assert sum(found[4].values()) == len(starts) == len(found[1]) // 33
-        assert set(found[4]) <= {1, 2}
+        assert sum(count for _, _, count in found[3].values()) == len(starts) == len(found[2]) // 8
+        assert set(found[3]) <= {1, 2}
     assert 1000 < walked < 19_000
+
+
+@compiled
+def test_chunks_are_found_within_the_bytes_that_are_given() -> None:
+    """Heads with lengths that contradict each other, cut anywhere."""
+    rng, found = random.Random(5), 0
+    for _ in range(6000):
+        data = b"".join(some_chunk(rng) for _ in range(rng.randrange(1, 4)))
+        data = memoryview(data)[: rng.randrange(len(data) + 1)]
+        end = 1000
+        for start, stored, size, _, after in records.chunks(data, 1000, 2, 2):
+            assert start == end + 53 and start + stored <= after <= 1000 + len(data)
+            assert data[start - 1000 : start + stored - 1000] == b"x" * stored and 0 <= size < 2**62
+            end, found = after, found + 1
+    assert 1000 < found < 5000
+
+
+def some_chunk(rng: random.Random) -> bytes:
+    """A chunk with message indexes, more often right than wrong."""
+
+    def perhaps(number: int) -> int:
+        return rng.choice((0, 1, 44, 2**62, 2**64 - 1)) if rng.random() < 0.04 else number
+
+    stored, entries = rng.randrange(40), [16 * rng.randrange(3) for _ in range(rng.randrange(4))]
+    head = RECORD_HEAD.pack(rng.choices((6, 7), (20, 1))[0], perhaps(44 + stored))
+    head += struct.pack("<QQQI", 0, 0, perhaps(90), 7)
+    head += rng.choices((b"\4\0\0\0zstd", b"\3\0\0\0lz4\0"), (20, 1))[0]
+    indexes = (struct.pack("<BQHI", 7, perhaps(n + 6), 1, n) + bytes(n) for n in entries)
+    return head + struct.pack("<Q", perhaps(stored)) + b"x" * stored + b"".join(indexes)
 
 
 def some_record(rng: random.Random) -> bytes:

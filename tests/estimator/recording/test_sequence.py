@@ -29,7 +29,8 @@ def test_chunks_that_count_on_are_in_place_through_gaps_and_wraps(
 ) -> None:
     sequence, number = ChunkSequence(), start
     for size in sizes:
-        assert sequence.add(chunk_of(number, size))
+        assert sequence.follows(chunk_of(number, size))
+        sequence.add(chunk_of(number, size))
         number += size + gap
     assert sequence.missing == gap * (len(sizes) - 1)
     assert sequence.counts() == {1: sum(sizes)}

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.wording import commands, errors, pages, refusals
+from tests.wording import commands, errors, live, pages, refusals
 from tests.wording.rig import OUTPUTS, text_of
 
 KEPT = Path(__file__).parent / "outputs"
-MAKERS = (commands, errors, pages, refusals)  # imported: they register what they make
+MAKERS = (commands, errors, live, pages, refusals)  # imported: they register what they make
 
 
 @pytest.mark.parametrize("name", sorted(OUTPUTS))

@@ -9,7 +9,6 @@ from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.tools.commands.status import summary
 from tests.estimator.filter.rig import RIG, TRUTH
 from tests.linear_plant import THREE_LOADS, readings
 
@@ -71,21 +70,3 @@ def test_a_change_of_the_soil_is_said_once() -> None:
 def test_an_honest_run_is_never_said_to_disagree() -> None:
     watch, said, flags = watched(0.0)
     assert not said and watch.present is None and not any(flag & Flag.MISMATCH for flag in flags)
-
-
-def test_status_names_channel_and_time() -> None:
-    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
-    loop, log = {"ticks": 1}, {"state": "writing", "dropped": 0, "file": "a", "error": ""}
-    report = {
-        "pid": 1,
-        "status": "TRACKING",
-        "flags": ["MISMATCH"],
-        "tick": {},
-        "loop": loop,
-        "log": log,
-    }
-    rest = {"devices": {}, "hanging": "", "real_time": "yes"}
-    assert "  model    disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off" in list(
-        summary({**report, **rest, "disagreement": found})
-    )
-    assert not any("model" in line for line in summary({**report, **rest, "disagreement": None}))

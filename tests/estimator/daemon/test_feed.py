@@ -57,12 +57,3 @@ def test_at_the_start_a_channel_may_take_a_second():
     assert followed((0.9, Status.STARTING, 7, 0), TRACKING)[1] == []
     feed, said = followed((3.0, Status.STARTING, 2, 0))
     assert feed.unfed == "STARTING carriage_encoder" and len(said) == 1
-
-
-def test_two_faults_of_one_channel_are_two_lines():
-    _, said = followed(TRACKING, (3.0, Status.STUCK, 0, 1), (3.0, Status.STALE, 1, 0), TRACKING)
-    assert [notice.text for _, notice in said] == [
-        "channel wheel_encoder: stuck while others move",
-        "channel wheel_encoder: nothing usable arrives",
-        "channel wheel_encoder: well again, after 3.0 s",
-    ]

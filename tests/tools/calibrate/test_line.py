@@ -58,7 +58,7 @@ def test_known_values_in_words() -> None:
     assert [v.value for v in known_values("0, 10, 25.4 mm", "m")] == [0.0, 0.01, 0.0254]
     assert [v.value for v in known_values("0 A, -500 mA", "A")] == [0.0, -0.5]
     for text in ("1 2 mm", "", "3 N", "x mm", "1,,2 mm"):
-        with pytest.raises(CommandError, match="expected a value such as"):
+        with pytest.raises(CommandError):
             known_values(text, "m")
 
 

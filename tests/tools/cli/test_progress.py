@@ -105,10 +105,3 @@ def test_a_name_cannot_move_the_cursor(clock: Clock) -> None:
         clock.now += 10.0
         progress.advance()
     assert stream.getvalue() == "run \\x1b[2J: 1 of 2 (50%), 10 s left\n"
-
-
-def test_a_named_step_says_about_how_much_is_done_and_left(clock: Clock) -> None:
-    with redirect_stderr(StringIO()) as said, Progress("diagnose") as progress:
-        clock.now += 20.0
-        progress.at("screening", 0.4)
-    assert said.getvalue() == "diagnose: screening (about 40%), 20 s, about 30 s left\n"

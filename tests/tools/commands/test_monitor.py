@@ -71,21 +71,6 @@ def test_the_monitor_fits_a_terminal_of_80_by_24_and_tells_of_trouble_first():
     ]
 
 
-def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
-    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
-    picture = list(monitor.lines({**HEALTHY, "disagreement": found}))
-    assert picture[1] == "! model disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off"
-    assert len(picture) <= 24 and list(monitor.lines({**HEALTHY, "disagreement": None})) == list(
-        monitor.lines(HEALTHY)
-    )
-
-
-def test_the_monitor_says_in_bold_that_the_soil_shown_is_the_prior():
-    picture = list(monitor.lines({**HEALTHY, "status": "AT_BOUND", "flags": ["PRIOR"]}))
-    assert "AT_BOUND PRIOR" in picture[0] and len(picture) <= 24
-    assert picture[1] == "! c, tan φ and k are the prior: the filter's estimate is not believed"
-
-
 def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
     """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never
     wrapped.

@@ -146,7 +146,7 @@ def test_a_lag_is_a_number_above_zero(
 
 def test_a_lag_beyond_the_logs_is_refused(tmp_path: Path) -> None:
     said = complaint("mgst", mgst_files(tmp_path), "-o", tmp_path / "out", "--lag", "60")
-    assert "found a lag of 60 s; expected less, the log has 6.0 s" in said
+    assert "60 s" in said and "6.0 s" in said
 
 
 def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:

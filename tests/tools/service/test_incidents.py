@@ -20,21 +20,6 @@ def said(totals, what="frames lost"):
     return [notice for notice in notices if notice is not None]
 
 
-def test_a_single_fault_is_one_line():
-    assert said([0, 0, 1]) == [Notice("frames lost: 1")]
-
-
-def test_many_faults_are_a_first_line_and_a_last_one_with_their_number():
-    first, last = said([0, 3, *range(4, 104)])
-    assert first == Notice("frames lost: 3")
-    assert last == Notice("frames lost: over after 10.0 s, 103 in all", over=True)
-
-
-def test_what_goes_on_is_said_once_a_minute():
-    lines = said(range(round(10 * PAUSE / LOOK)))
-    assert 10 <= len(lines) <= 11 and lines[1].text == "frames lost: 600, 601 in all"
-
-
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=400))
 def test_no_fault_is_left_uncounted_and_lines_are_few(steps):
     """Of every count the last line about it says all."""

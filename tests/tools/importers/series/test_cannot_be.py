@@ -163,7 +163,7 @@ def test_a_time_that_jumps_by_a_thousand_steps_is_told(
     (tmp_path / "run.csv").write_text("\n".join([header, *rows[:300], *later]))
     said(tmp_path / "run.csv", tmp_path, SPEEDS)
     (line,) = complaints(capsys)
-    assert "jumps by 30.02 s" in line
+    assert "30.02 s" in line
 
 
 def test_the_same_is_told_of_a_recording(

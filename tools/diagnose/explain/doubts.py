@@ -20,8 +20,8 @@ def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
 
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
     """Constants far from what is known of them [σ], the farthest first."""
-    told = [(c.name, float(u)) for c, u in zip(rig.constants, model.fitted.u, strict=True)]
-    far = [(name, u) for name, u in told if abs(u) >= TUNING.explain.doubtful]
+    constants = [(c.name, float(u)) for c, u in zip(rig.constants, model.fitted.u, strict=True)]
+    far = [(name, u) for name, u in constants if abs(u) >= TUNING.explain.doubtful]
     return sorted(far, key=lambda each: -abs(each[1]))
 
 

@@ -43,7 +43,7 @@ def next_experiment(
 def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     rig = search.problem.stack.rig
-    gains = {key: _told_apart(search, rivals, key) for key in rig.words.menu.driven} | _measured(
+    gains = {key: _distinguished(search, rivals, key) for key in rig.words.menu.driven} | _measured(
         rig, rivals
     )
     settled = {key: sum(gain >= TUNING.screen.sure for gain in each) for key, each in gains.items()}
@@ -51,10 +51,10 @@ def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None
     best = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])), default="")
     each = gains.get(best, [])
     least = min(TUNING.screen.sure, max(each, default=0.0))
-    told = [m for m, gain in zip(rivals[1:], each, strict=False) if gain >= least > 0.0]
-    if not told:
+    distinguished = [m for m, gain in zip(rivals[1:], each, strict=False) if gain >= least > 0.0]
+    if not distinguished:
         return _by_hand(rig, _apart(rivals))
-    return _foretold(best, float(np.mean(each)), _apart([rivals[0], *told]))
+    return _proposed(best, float(np.mean(each)), _apart([rivals[0], *distinguished]))
 
 
 def _apart(rivals: Sequence[Model]) -> tuple[str, ...]:
@@ -70,10 +70,10 @@ def _most_shown(gains: Mapping[str, Mapping[str, float]]) -> NextExperiment | No
     if not key or median[key] <= 0.0:
         return None
     shown = [n for n, gain in gains[key].items() if gain >= min(TUNING.screen.sure, median[key])]
-    return _foretold(key, median[key], tuple(shown))
+    return _proposed(key, median[key], tuple(shown))
 
 
-def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
+def _proposed(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
     return NextExperiment(
         key, EXPERIMENTS[key], separates, gain, float(1.0 / (1.0 + np.exp(-gain)))
     )
@@ -83,7 +83,7 @@ def _by_hand(rig: Rig, names: Sequence[str]) -> NextExperiment | None:
     """What the rivals' own files name, where nothing is foreseen to tell."""
     keys = (rig.effects[one].confusable_with.get(other) for one in names for other in names)
     key = next(filter(None, keys), None)
-    return _foretold(key, float("nan"), tuple(names)) if key else None
+    return _proposed(key, float("nan"), tuple(names)) if key else None
 
 
 # ---- rivals ------------------------------------------------------------------------------------
@@ -96,7 +96,7 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.shown] if best.names else []
 
 
-def _told_apart(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
+def _distinguished(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
     """Expected gain between the first and every other rival [nats]."""
     first, *others = (m.fitted for m in rivals)
     return _gains(search, key, first.u, first.acting, [(m.u, m.acting) for m in others])
@@ -115,10 +115,10 @@ def _measured(rig: Rig, rivals: list[Model]) -> dict[str, list[float]]:
                 known = rig.effects[f.name].confusable_with
                 keys = {known[name] for name in rival.names if name in known}
                 for key in keys - set(rig.words.menu.driven):
-                    told = 0.5 * (x / TUNING.explain.instrument) ** 2
+                    nats = 0.5 * (x / TUNING.explain.instrument) ** 2
                     each = gains.setdefault(key, [0.0 for _ in others])
                     if f.parameter.role == "strength":
-                        each[number] = max(each[number], told)
+                        each[number] = max(each[number], nats)
 
     return dict(sorted(gains.items()))
 
@@ -181,7 +181,7 @@ def _along_misfit(
     """
     covariate, q = (location[0].covariate, location[0].q) if location else ("wheel_angle", 1.0)
     gain = -float(np.log(max(q, SQUARE))) / len(rig.runs)
-    return _foretold(rig.words.menu.along.get(covariate, rig.words.menu.otherwise), gain, separates)
+    return _proposed(rig.words.menu.along.get(covariate, rig.words.menu.otherwise), gain, separates)
 
 
 # ---- what is foreseen --------------------------------------------------------------------------
@@ -228,9 +228,9 @@ def _values(foreseen: Foreseen) -> Array:
 
 def _noise(search: EffectSearch, here: Foreseen) -> Array:
     """Standard deviation of each of these values; infinite where a channel tells nothing."""
-    stack, told = search.problem.stack, {}
+    stack, sigmas = search.problem.stack, {}
     for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
         usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
         sigma = np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual)
-        told[channel] = np.where(here.tells[channel], sigma, np.inf)
-    return _values(Foreseen(told, here.tells))
+        sigmas[channel] = np.where(here.tells[channel], sigma, np.inf)
+    return _values(Foreseen(sigmas, here.tells))

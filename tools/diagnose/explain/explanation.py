@@ -73,7 +73,7 @@ def explain(
         hypotheses=hypotheses,
         soil=soil,
         fit=fit,
-        law=_told(law, after, soil, rig) if law else None,
+        law=_reported_law(law, after, soil, rig) if law else None,
         next_experiment=proposed,
         caveats=_caveats(problem, accepted, whole, redo, search.failed, location),
         share=decision.share,
@@ -110,7 +110,7 @@ def _test(screen: Screen) -> Test:
 
 
 def _located(search: EffectSearch, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
-    """Where the misfit was made: told of the base model held at what was found beside the accepted
+    """Where the misfit was made: of the base model held at what was found beside the accepted
     effects.
     """
     if not search.first.alarmed:
@@ -215,7 +215,7 @@ def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[st
     return found
 
 
-def _told(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
+def _reported_law(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
     """The law, and whether it carries the misfit: it takes nearly all, and foretells runs that were
     held out better than the discrepancy of form does. Its soil is no better known than that of all
     explanations.
@@ -225,8 +225,8 @@ def _told(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
     if soil is None:
         return replace(law.law, carries=carries)
     beside = constants_of(rig, law.plain, soil=True)
-    told = {n: replace(q, sigma=max(q.sigma, soil.after[n].sigma)) for n, q in beside.items()}
-    return replace(law.law, carries=carries, soil=told)
+    widened = {n: replace(q, sigma=max(q.sigma, soil.after[n].sigma)) for n, q in beside.items()}
+    return replace(law.law, carries=carries, soil=widened)
 
 
 # ---- fit and noise -- ------------------------------------------------------------------

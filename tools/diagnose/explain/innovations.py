@@ -74,10 +74,10 @@ def with_innovations(
             except config.ConfigError as error:
                 after = Filtered(note=_failed(error))
 
-    told = before.innovations if after.innovations else None
+    compared = before.innovations if after.innovations else None
     fit = replace(
         diagnosis.fit,
-        innovation_before=told,
+        innovation_before=compared,
         innovation_after=after.innovations,
         innovation_note=after.note,
     )

@@ -94,19 +94,19 @@ class _Unknowns:
         self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))
 
         count = len(fitted.u)
-        told = [k for k in rig.constants if k.soil]
-        self.soil_names = [k.name for k in told]
-        at = [linear(rig, k, self.mean[:count]) for k in told]
-        self.soil = np.zeros((len(told), len(self.mean)))
+        constants = [k for k in rig.constants if k.soil]
+        self.soil_names = [k.name for k in constants]
+        at = [linear(rig, k, self.mean[:count]) for k in constants]
+        self.soil = np.zeros((len(constants), len(self.mean)))
         self.soil[:, :count] = np.array([slope for _, slope in at])
         own = self.soil @ self.spread @ self.soil.T
         sigma, self.among = _parted(own)
         # correlation, times its own σ, of every unknown with the soil
         self.beside = self.spread @ self.soil.T / sigma
         # as it is once the soil is the one that is written
-        written = [soil[k.name].value - value for k, (value, _) in zip(told, at, strict=True)]
+        written = [soil[k.name].value - value for k, (value, _) in zip(constants, at, strict=True)]
         apart = np.linalg.lstsq(self.among, np.array(written) / sigma, rcond=None)[0]
-        self.told = self.mean + self.beside @ apart
+        self.adjusted = self.mean + self.beside @ apart
 
 
 def _parted(covariance: Array) -> tuple[Array, Array]:
@@ -143,8 +143,8 @@ def _source(
     end = unknowns.places[number].stop  # what goes with the wheel's angle stands last
     whole[:, end - 2 * len(TUNING.fit.form_harmonics) : end] = 0.0
     whole[:, unknowns.place_of_held] = unknowns.held[rows]
-    told = _calibration(stack.rig)
-    whole[:, told] = fitted.raw[rows][:, told]
+    calibration = _calibration(stack.rig)
+    whole[:, calibration] = fitted.raw[rows][:, calibration]
 
     values = stack.measured[stack.of(source.channels[-1]) & rows]
     usual = float(np.sqrt(np.mean(values**2))) if source.size is None else source.size
@@ -184,7 +184,7 @@ class _Reduced:
         maps = [_fit_of(part.features) for part in parts.values()]
         self._map = np.vstack([m @ p.map for m, p in zip(maps, parts.values(), strict=True)])
         start = np.concatenate([m @ p.start for m, p in zip(maps, parts.values(), strict=True)])
-        self.mean = self._map @ unknowns.told + start
+        self.mean = self._map @ unknowns.adjusted + start
         spread, shared = unknowns.spread, self._map @ unknowns.beside
 
         root = _root(list(parts.values()))
@@ -218,7 +218,7 @@ class _Reduced:
     def _channel(self, part: _Source, place: slice) -> ChannelForm:
         """Where the points cannot follow by more than its size, the size is that."""
         mean, spread = self.mean[place], self.directions[place].T
-        left = part.map @ self._unknowns.told + part.start - part.features @ mean
+        left = part.map @ self._unknowns.adjusted + part.start - part.features @ mean
         whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
         kept = np.sum((part.features @ spread.T) ** 2, axis=1)
         rest = float(np.sqrt(np.mean(np.maximum(whole - kept, 0.0) + left**2)))

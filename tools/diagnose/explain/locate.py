@@ -2,9 +2,9 @@
 stops, and a sentence.
 
 In each channel functions are taken up by evidence, one beside the others, so that one place of the
-misfit is not told once for every covariate that varies along with it: smooth functions, waves,
+misfit is not reported once for every covariate that varies along with it: smooth functions, waves,
 ripples of the wheel, steps, and stretches between two steps. Each stands about a mean of its own:
-what grows with slip from nothing is not told as a constant and a slope. What drifts or curves is
+what grows with slip from nothing is not shown as a constant and a slope. What drifts or curves is
 taken by a smooth function and has no change point.
 """
 

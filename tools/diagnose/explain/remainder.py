@@ -26,7 +26,7 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
     """Of each channel: what the model predicts without its discrepancies, against the recording,
     beyond the noise.
     """
-    stack, rig, told = problem.stack, problem.stack.rig, {}
+    stack, rig, found = problem.stack, problem.stack.rig, {}
     every = smooth_signatures(stack, everywhere=True)
     left = stack.measured - model.fitted.predicted
 
@@ -36,9 +36,9 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
         near = size <= colour.sigma
         functions = [s for s in every if s.shape.channel == channel]
         where = WITHIN if near else _where(stack, channel, functions, left)
-        told[channel] = Remainder(size, rig.units[channel], where)
+        found[channel] = Remainder(size, rig.units[channel], where)
 
-    return told
+    return found
 
 
 def _where(stack: Stack, channel: str, functions: Sequence[Signature], left: Array) -> str:
@@ -81,10 +81,10 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
             size = marginal.size_of(model.chosen, number)
             squares += size**2 * np.sum(freedom.columns**2, axis=1)
 
-    told = {}
+    found = {}
     for channel in rig.channels:
         own = stack.of(channel)
         size = float(np.sqrt(np.mean(squares[own]))) if own.any() else 0.0
-        told[channel] = Discrepancy(size, rig.units[channel], learnt)
+        found[channel] = Discrepancy(size, rig.units[channel], learnt)
 
-    return told
+    return found

@@ -18,10 +18,10 @@ ALONG = {"angle": "1/turn", "time": "Hz"}
 
 def ripples_of(rig: Rig) -> tuple[Ripple, ...]:
     """All lines of the new campaign, the likeliest first."""
-    return tuple(_told(rig, line) for line in sorted(rig.lines.new, key=lambda x: x.p))
+    return tuple(_ripple(rig, line) for line in sorted(rig.lines.new, key=lambda x: x.p))
 
 
-def _told(rig: Rig, line: SpectralLine) -> Ripple:
+def _ripple(rig: Rig, line: SpectralLine) -> Ripple:
     return Ripple(
         line.channel,
         line.at,
@@ -37,7 +37,7 @@ def _told(rig: Rig, line: SpectralLine) -> Ripple:
     )
 
 
-def left_over(rig: Rig, accepted: Sequence[Effect], told: Collection[str] = ()) -> Iterator[str]:
+def left_over(rig: Rig, accepted: Sequence[Effect], places: Collection[str] = ()) -> Iterator[str]:
     """Sentences for new ripples that no accepted effect has, for vibrations, and where ripples
     aligned the runs. told: channels that are said to oscillate in time already.
     """
@@ -51,16 +51,16 @@ def left_over(rig: Rig, accepted: Sequence[Effect], told: Collection[str] = ()) 
     ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
     if ripples:
         yield f"The wheel ripples, and no accepted effect does: {_listed(rig, ripples)}."
-    if vibrations := [x for x in rig.lines.fresh("time") if x.channel not in told]:
+    if vibrations := [x for x in rig.lines.fresh("time") if x.channel not in places]:
         yield f"The recordings vibrate, whatever the speed: {_listed(rig, vibrations)}."
 
 
 def _listed(rig: Rig, lines: Sequence[SpectralLine]) -> str:
     """The likeliest places with their channels, in words."""
     groups = _grouped(sorted(lines, key=lambda x: x.p))
-    told = [_place(rig, group) for group in groups[: TUNING.explain.shown]]
-    more = len(groups) - len(told)
-    return "; ".join(told) + (f"; and {more} more" if more else "")
+    places = [_place(rig, group) for group in groups[: TUNING.explain.shown]]
+    more = len(groups) - len(places)
+    return "; ".join(places) + (f"; and {more} more" if more else "")
 
 
 def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:

@@ -35,7 +35,7 @@ def constants_of(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
     """Constants of one fit: of the soil, or all others."""
     count = len(fitted.u)
     spread = fitted.covariance()[:count, :count]
-    return {k.name: _told(rig, k, fitted.u, spread) for k in rig.constants if k.soil == soil}
+    return {k.name: _quantity(rig, k, fitted.u, spread) for k in rig.constants if k.soil == soil}
 
 
 def averaged_soil(problem: Problem, decision: Decision) -> dict[str, Quantity]:
@@ -47,14 +47,15 @@ def averaged_soil(problem: Problem, decision: Decision) -> dict[str, Quantity]:
         (w.model, w.probability) for w in decision.weighed if w.probability > TUNING.screen.level
     ]
 
-    told = [(_soil_of(problem, model), share) for model, share in every or [(decision.best, 1.0)]]
-    total = sum(share for _, share in told)
+    soils = [(_soil_of(problem, model), share) for model, share in every or [(decision.best, 1.0)]]
+    total = sum(share for _, share in soils)
 
     out = {}
-    for name, first in told[0][0].items():
-        mean = sum(share * soil[name].value for soil, share in told) / total
+    for name, first in soils[0][0].items():
+        mean = sum(share * soil[name].value for soil, share in soils) / total
         square = sum(
-            share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
+            share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2)
+            for soil, share in soils
         )
         out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
 
@@ -78,14 +79,14 @@ def _soil_of(problem: Problem, model: Model) -> dict[str, Quantity]:
     """The soil of one explanation. What stands at its bound is not known better than before."""
     rig = problem.stack.rig
     mean, spread = with_forms_had(problem, model).constants()
-    told = {}
+    found = {}
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):
         if constant.soil:
-            quantity = _told(rig, constant, mean, spread)
-            before = _told(rig, constant, mean, np.eye(len(mean)))
+            quantity = _quantity(rig, constant, mean, spread)
+            before = _quantity(rig, constant, mean, np.eye(len(mean)))
             own = replace(quantity, sigma=constant.sigma) if held else quantity
-            told[constant.name] = _doubting(constant, own, before.sigma)
-    return told
+            found[constant.name] = _doubting(constant, own, before.sigma)
+    return found
 
 
 def _doubting(known: Constant, fitted: Quantity, before: float) -> Quantity:
@@ -100,7 +101,7 @@ def _doubting(known: Constant, fitted: Quantity, before: float) -> Quantity:
     return replace(fitted, value=value, sigma=known.spread(wider * mean, wider * sigma))
 
 
-def _told(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:
+def _quantity(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:
     """Value and σ of a constant from the mean (q,) and covariance (q, q) of all, in prior σ; of a
     bed that was prepared anew, in the new campaign.
     """

@@ -68,23 +68,23 @@ def sentence(
     """What a channel (residual (N,) of the stack) does along a covariate, in such a shape; size: of
     a wave, its amplitude in the channel's unit.
     """
-    told = _Told(stack, residual, shape.channel)
+    here = _Where(stack, residual, shape.channel)
     if shape.kind == "wave":
         words = _oscillates(stack, shape, size)
     elif shape.kind != "smooth":
-        words = told.between(shape)
+        words = here.between(shape)
     else:
-        ways = {"run": told.runs, "constant": told.everywhere, "direction": told.directions}
+        ways = {"run": here.runs, "constant": here.everywhere, "direction": here.directions}
         if len(shape.along) > 1:
-            words = told.corner(shape.along)
+            words = here.corner(shape.along)
         else:
-            words = ways[covariate]() if covariate in ways else told.along(covariate)
+            words = ways[covariate]() if covariate in ways else here.along(covariate)
     return _started(f"{spelled(shape.channel)}, {words}; {percent(share)} of its misfit")
 
 
 def along_covariate(stack: Stack, residual: Array, channel: str, covariate: str) -> str:
     """What a channel of a residual (N,) does along a covariate, without its name."""
-    return _Told(stack, residual, channel).along(covariate)
+    return _Where(stack, residual, channel).along(covariate)
 
 
 def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:
@@ -150,7 +150,7 @@ def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
     return f"waves of {length} along the bed, {amplitude}"
 
 
-class _Told:
+class _Where:
     """What a channel's residual is, as more or less than the model."""
 
     def __init__(self, stack: Stack, residual: Array, channel: str) -> None:
@@ -187,10 +187,10 @@ class _Told:
         x, index = self._stack.covariate(covariate), np.flatnonzero(self._own)
         parts = np.array_split(index[np.argsort(x[index], kind="stable")], 3)
         (low, middle, high) = (float(self._residual[part].mean()) for part in parts)
-        told = [0, 2] if min(low, high) <= middle <= max(low, high) else [0, 1, 2]
+        shown = [0, 2] if min(low, high) <= middle <= max(low, high) else [0, 1, 2]
 
-        at = self._apart(covariate, [float(x[parts[k]].mean()) for k in told])
-        first, *rest = (self._say((low, middle, high)[k]) for k in told)
+        at = self._apart(covariate, [float(x[parts[k]].mean()) for k in shown])
+        first, *rest = (self._say((low, middle, high)[k]) for k in shown)
         others = (f"{_brief(say)} at {v}" for say, v in zip(rest, at[1:], strict=True))
         return ", ".join([f"{first} at {AT.get(covariate, '{}').format(at[0])}", *others])
 

@@ -100,12 +100,12 @@ def estimate(
     waves = standing(stack, residual, explainable, cells)
     saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
 
-    told = each(
+    posteriors = each(
         jobs,
         lambda channel: _posterior(stack, channel, residual, saturated, cells, before, ~stack.idle),
         stack.rig.channels,
     )
-    colours = _chosen(stack, told)
+    colours = _chosen(stack, posteriors)
     own = replicates.own_columns(stack, residual, colours, waves)
     noise = _noise(stack, predicted, residual, colours, own, explainable.leading)
     return calmer(noise, residual, saturated, cells, before, stack.idle)
@@ -126,11 +126,11 @@ def estimate_of_reference(
     may stand off their neighbours.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
-    told = [
+    posteriors = [
         _posterior(stack, channel, residual, explainable, cells, before, ~stack.new & ~stack.idle)
         for channel in stack.rig.channels
     ]
-    colours = _chosen(stack, told)
+    colours = _chosen(stack, posteriors)
 
     none = np.zeros((stack.size, 0))
     noise = _noise(stack, predicted, calm, colours, none, explainable.leading)

@@ -34,10 +34,10 @@ class Lines:
     def renamed(self, name: str, channel: str, scale: float) -> Lines:
         """With the lines of one channel as those of another, in whose unit it is `scale`."""
 
-        def told(lines: Sequence[SpectralLine]) -> tuple[SpectralLine, ...]:
+        def scaled(lines: Sequence[SpectralLine]) -> tuple[SpectralLine, ...]:
             return tuple(x.scaled(channel, scale) if x.channel == name else x for x in lines)
 
-        return replace(self, new=told(self.new), reference=told(self.reference))
+        return replace(self, new=scaled(self.new), reference=scaled(self.reference))
 
     def of(self, channel: str) -> list[SpectralLine]:
         """All lines of a channel, those of both campaigns once."""

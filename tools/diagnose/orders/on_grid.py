@@ -32,7 +32,7 @@ def on_grid(
 ) -> tuple[Series, Array]:
     """Readings of a channel less its lines, and what of them belongs to the grid (g,).
 
-    lines: of this channel; angle: the wheel's [rad] as its encoder told it; read: times [s] and
+    lines: of this channel; angle: the wheel's [rad] as its encoder read it; read: times [s] and
     values (n,); middle: of the grid's intervals (g,) [s].
     """
     time, values = read

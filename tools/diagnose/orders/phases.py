@@ -1,4 +1,4 @@
-"""The angle at which the encoder of each run begins, told by a ripple of the wheel.
+"""The angle at which the encoder of each run begins, found by a ripple of the wheel.
 
 An incremental encoder counts from where it was switched on. Runs of another day then ripple with
 another phase, though gear or lugs are the same. The phases of one sure ripple tell the difference,

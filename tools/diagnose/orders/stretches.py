@@ -107,7 +107,7 @@ def steady_samples(
 ) -> dict[str, Samples]:
     """What each channel read in the steady stretches of a run.
 
-    angle: the wheel's [rad] as its encoder told it; most: readings of a channel that are kept.
+    angle: the wheel's [rad] as its encoder read it; most: readings of a channel that are kept.
     Channels without a reading there are left out.
     """
     begins, ends = stretches(motion)

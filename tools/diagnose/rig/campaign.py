@@ -92,7 +92,7 @@ class Campaign:
 
 
 def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:
-    """A channel's readings (n,) in its unit; `torque` is the motor's, told by its current."""
+    """A channel's readings (n,) in its unit; `torque` is the motor's, by its current."""
     if channel == "torque":
         return np.asarray(settings.drive.torque_constant.value * sensed.current)
     return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))

@@ -74,15 +74,15 @@ def idle_values(
     driven = np.concatenate([a[driving] for a, (driving, _, _) in zip(axles, every, strict=True)])
     least = TUNING.rig.holding * float(np.sqrt(np.mean(driven**2))) if driven.size else 0.0
 
-    told = []
+    made = []
     for axle, (_, resting, lifted) in zip(axles, every, strict=True):
         idle = np.zeros(axle.size, bool)
         for state in (resting, lifted):
             edges = np.flatnonzero(np.diff(state.astype(int), prepend=0, append=0))
             for first, end in edges.reshape(-1, 2):
                 idle[first:end] = abs(float(np.mean(axle[first:end]))) < least
-        told.append(idle)
-    return told
+        made.append(idle)
+    return made
 
 
 def sinkage_from_prior(
@@ -118,12 +118,12 @@ def torque_is_held(runs: Sequence[GridRun]) -> bool:
 
 def without_torque_at_rest(runs: Sequence[GridRun]) -> list[GridRun]:
     """The runs, in which no torque counts while the wheel stands."""
-    told = []
+    made = []
     for run in runs:
         moving = run.covariates["speed"] != 0.0
         torques = {c: run.used[c] & moving for c in ("torque", "axle_torque") if c in run.used}
-        told.append(replace(run, used={**run.used, **torques}))
-    return told
+        made.append(replace(run, used={**run.used, **torques}))
+    return made
 
 
 def _resting(run: GridRun) -> Bools:

@@ -61,14 +61,14 @@ def errors_of_motion(
 def _by(predict: Predict, constants: Sequence[Constant], name: str) -> list[dict[str, Array]]:
     """Per run, change of every channel (n,) by a relative constant."""
     moved = np.array([float(constant.name == name) for constant in constants])
-    told = zip(predict(0.0 * moved, ()), predict(moved, ()), strict=True)
+    pairs = zip(predict(0.0 * moved, ()), predict(moved, ()), strict=True)
     sigma = next(constant.sigma for constant in constants if constant.name == name)
-    return [{c: (two[c] - one[c]) / sigma for c in one} for one, two in told]
+    return [{c: (two[c] - one[c]) / sigma for c in one} for one, two in pairs]
 
 
 def _moved(changes: Sequence[Channels], parts: Parts) -> list[Channels]:
-    told = zip(changes, parts, strict=True)
-    return [{channel: change * part for channel, change in run.items()} for run, part in told]
+    pairs = zip(changes, parts, strict=True)
+    return [{channel: change * part for channel, change in run.items()} for run, part in pairs]
 
 
 # ---- speeds --------------------------------------------------------------------------------------

@@ -70,8 +70,8 @@ class Stack:
     @cached_property
     def motion_sigma(self) -> Array:
         """(N,) in the channels' units: see Rig.motion_sigma."""
-        told = self.rig.motion_sigma
-        return self.joined(told) if told else np.zeros(self.size)
+        sigma = self.rig.motion_sigma
+        return self.joined(sigma) if sigma else np.zeros(self.size)
 
     @cached_property
     def unrest(self) -> Array:

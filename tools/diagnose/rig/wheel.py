@@ -110,54 +110,54 @@ def wheel_rig(
     signals = to_one_side(signals)
     again = partial(wheel_rig, signals, settings, reference, bed, read_off, lines)
     alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
-    told = _recorded(signals, settings, reference, read_off)
+    data = _recorded(signals, settings, reference, read_off)
     known = [effect.name for effect in settings.effects]
-    settings = replace(settings, effects=_acting(settings.effects, told.stated))
-    acting = replace(settings, effects=(*settings.effects, *_acting(had, told.stated)))
+    settings = replace(settings, effects=_acting(settings.effects, data.stated))
+    acting = replace(settings, effects=(*settings.effects, *_acting(had, data.stated)))
 
     anew, tabled = bool(reference) and bed == "prepared", tables(signals)
     prepared = preparation(settings) if anew else {}
     constants = (
-        *wheel_constants(settings, told.channels, told.driven.sets, told.stated, had),
+        *wheel_constants(settings, data.channels, data.driven.sets, data.stated, had),
         *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
     )
-    runs = _measured(told, settings, acting, constants)
-    holding = "torque" in told.channels and torque_is_held(runs)
+    runs = _measured(data, settings, acting, constants)
+    holding = "torque" in data.channels and torque_is_held(runs)
     runs = without_torque_at_rest(runs) if holding else runs
 
     radius, held = settings.wheel.radius, None
     if settings.discrepancy is not None:
-        held = held_form(settings.discrepancy, runs, told.channels, radius, told.loss)
+        held = held_form(settings.discrepancy, runs, data.channels, radius, data.loss)
     prediction = Prediction(
         acting,
-        told.channels,
+        data.channels,
         constants,
-        told.driven,
+        data.driven,
         tuple(prepared),
-        told.idle,
+        data.idle,
         held.means if held else None,
     )
     errors = errors_of_motion(
         prediction.channels,
         constants,
-        told.driven.motions,
-        told.weights,
+        data.driven.motions,
+        data.weights,
         [s.doubt for s in signals],
     )
-    relief = anew and not tabled and "sinkage" in told.channels
+    relief = anew and not tabled and "sinkage" in data.channels
     return Rig(
         runs=runs,
-        channels=told.channels,
+        channels=data.channels,
         units=UNITS,
         constants=constants,
-        effects=candidates(signals, _left_out(known, told.stated)),
-        new=told.driven.new,
+        effects=candidates(signals, _left_out(known, data.stated)),
+        new=data.driven.new,
         predict=prediction.channels,
         words=RigWords(
-            tuple(_sentences(told, settings, holding)),
+            tuple(_sentences(data, settings, holding)),
             MENU,
-            tuple(_shortcomings(runs, told.channels)),
-            _law(radius, told.loss),
+            tuple(_shortcomings(runs, data.channels)),
+            _law(radius, data.loss),
         ),
         smooth=SMOOTH,
         heated=("torque",),
@@ -167,16 +167,16 @@ def wheel_rig(
         reference=alone if reference else None,
         baseline=configured(settings.effects),
         slipping="carriage_scale",
-        partial=_partial(told.driven.sets),
-        forms=_forms(told, runs, settings),
+        partial=_partial(data.driven.sets),
+        forms=_forms(data, runs, settings),
         held=held,
         lines=lines,
-        loss_of_drive=told.loss,
+        loss_of_drive=data.loss,
         tabled=tabled,
-        stated_noise={} if tabled else noise_of_readings(settings, told.loss),
+        stated_noise={} if tabled else noise_of_readings(settings, data.loss),
         motion_sigma=errors.sigma,
         unrest=() if tabled else errors.unrest,
-        reliefs=list(reliefs_of(runs, told.channels, height_of(settings))) if relief else (),
+        reliefs=list(reliefs_of(runs, data.channels, height_of(settings))) if relief else (),
     )
 
 
@@ -197,31 +197,31 @@ def _recorded(
 
 
 def _measured(
-    told: _Recorded, settings: Settings, acting: Settings, constants: Sequence[Constant]
+    data: _Recorded, settings: Settings, acting: Settings, constants: Sequence[Constant]
 ) -> list[GridRun]:
     """acting: settings with all effects that both campaigns have."""
     prior = {constant.name: constant.value for constant in constants}
     soil, effects = Soil(*(prior[name] for name in SOIL)), configured(acting.effects)
-    idles: Sequence[Bools | None] = told.idle or [None for _ in told.signals]
+    idles: Sequence[Bools | None] = data.idle or [None for _ in data.signals]
 
     return [
         measured_run(
             one,
             motion,
             settings,
-            told.channels,
+            data.channels,
             sinkage_from_prior(motion, settings, soil, effects),
             idle,
-            tables(told.signals),
+            tables(data.signals),
         )
-        for one, motion, idle in zip(told.signals, told.driven.motions, idles, strict=True)
+        for one, motion, idle in zip(data.signals, data.driven.motions, idles, strict=True)
     ]
 
 
-def _forms(told: _Recorded, runs: Sequence[GridRun], settings: Settings) -> tuple[FormSource, ...]:
+def _forms(data: _Recorded, runs: Sequence[GridRun], settings: Settings) -> tuple[FormSource, ...]:
     constant = settings.drive.torque_constant.value
-    motor = [measured_of(s, "torque", constant) for s in told.signals] if told.loss else None
-    return wheel_forms(runs, told.channels, settings.wheel.radius, motor)
+    motor = [measured_of(s, "torque", constant) for s in data.signals] if data.loss else None
+    return wheel_forms(runs, data.channels, settings.wheel.radius, motor)
 
 
 def _partial(sets: WeightSets) -> dict[str, tuple[str, Sequence[Bools]]]:
@@ -257,12 +257,12 @@ def _shortcomings(runs: Sequence[GridRun], channels: Sequence[str]) -> Iterator[
         yield "No force sensor: what acts on the drawbar pull alone cannot show."
 
 
-def _sentences(told: _Recorded, settings: Settings, holding: bool) -> Iterator[str]:
+def _sentences(data: _Recorded, settings: Settings, holding: bool) -> Iterator[str]:
     """What to know of the comparison; holding: a servo holds torque at rest."""
-    yield from (s.left_out for s in told.signals if s.left_out)
-    if not told.stated:
+    yield from (s.left_out for s in data.signals if s.left_out)
+    if not data.stated:
         yield MEASURED_NOTE
-    if told.loss:
+    if data.loss:
         yield LOSS_NOTE
     if sentence := raised_to_floors(settings):
         yield sentence

@@ -33,8 +33,8 @@ def test_every_parameter_at_its_bound_is_told_but_a_strength_at_nought() -> None
     )
 
 
-@pytest.mark.parametrize(("sigma", "told"), [(0.7e-3, 0), (7.7e-3, 1)])
-def test_noise_far_above_what_is_stated_is_told(sigma: float, told: int) -> None:
+@pytest.mark.parametrize(("sigma", "shown"), [(0.7e-3, 0), (7.7e-3, 1)])
+def test_noise_far_above_what_is_stated_is_told(sigma: float, shown: int) -> None:
     """0.25 mm is stated of a reading: a grid value, a mean of some, should scatter less."""
     rig: Any = SimpleNamespace(
         constants=[],
@@ -48,7 +48,7 @@ def test_noise_far_above_what_is_stated_is_told(sigma: float, told: int) -> None
     )
     noise: Any = SimpleNamespace(colours=(SimpleNamespace(sigma=sigma),))
     sentences = doubts(rig, _model(fitted), noise)
-    assert len(sentences) == told
+    assert len(sentences) == shown
     assert all("7.7 mm, 31 times" in s and "0.25 mm" in s for s in sentences)
 
 

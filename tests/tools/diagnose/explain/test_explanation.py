@@ -23,9 +23,9 @@ def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool, ve
         "torque": Remainder(0.001, "N·m", "within the noise"),
         "sinkage": Remainder(0.0046, "m", "−2.8 mm at 5 % slip, +6.8 mm at 49 % slip"),
     }
-    told = _remaining(decision, [], left, formed)
+    shown = _remaining(decision, [], left, formed)
     who = "Without its discrepancy of form, the model" if formed else "The model"
-    assert told == (f"{who} misses sinkage by 4.6 mm (−2.8 mm at 5 % slip, +6.8 mm at 49 % slip).")
+    assert shown == (f"{who} misses sinkage by 4.6 mm (−2.8 mm at 5 % slip, +6.8 mm at 49 % slip).")
     assert _remaining(decision, [], {}, formed) == "Nothing above the noise remains."
 
 
@@ -39,10 +39,10 @@ def test_a_strength_is_as_uncertain_as_its_form_makes_it() -> None:
     rig: Any = SimpleNamespace(unit_factors={})
 
     exact = parameters(rig, model, "stribeck_friction")
-    told = parameters(rig, model, "stribeck_friction", forms=0.2)
-    assert (told["excess"].value, told["excess"].sigma) == pytest.approx((2.0, 0.5))
+    shown = parameters(rig, model, "stribeck_friction", forms=0.2)
+    assert (shown["excess"].value, shown["excess"].sigma) == pytest.approx((2.0, 0.5))
     assert exact["excess"].sigma == pytest.approx(0.3)
-    assert told["speed"] == exact["speed"]
+    assert shown["speed"] == exact["speed"]
 
 
 def test_a_parameter_at_its_bound_is_not_known_exactly() -> None:

@@ -125,10 +125,10 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
     accepted = explained(screening, effect)
     held = unmoved(screening, accepted)
 
-    told = locate(screening, held, held.fitted.predicted)
-    assert ("drawbar_pull", "time") in {(place.channel, place.covariate) for place in told}
+    shown = locate(screening, held, held.fitted.predicted)
+    assert ("drawbar_pull", "time") in {(place.channel, place.covariate) for place in shown}
     begun_elsewhere = replace(screening, base=accepted)
-    assert locate(begun_elsewhere, held, held.fitted.predicted) == told
+    assert locate(begun_elsewhere, held, held.fitted.predicted) == shown
 
 
 @pytest.mark.slow

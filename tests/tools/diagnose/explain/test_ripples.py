@@ -44,9 +44,9 @@ def test_vibrations_and_what_the_reference_has_are_kept_apart() -> None:
     rig = _rig((_line("load", "time", 7.3), _line("torque", "angle", 9.0)),
                (_line("torque", "angle", 9.0),))  # fmt: skip
     assert [s for s in left_over(rig, ()) if "7.30 Hz (load ± 0.50 N)" not in s] == []
-    told = {r.along: r for r in ripples_of(rig)}
-    assert told["1/turn"].reference and not told["Hz"].reference
-    assert json.loads(json.dumps(plain(vars(told["Hz"]))))["harmonic_of"] is None
+    shown = {r.along: r for r in ripples_of(rig)}
+    assert shown["1/turn"].reference and not shown["Hz"].reference
+    assert json.loads(json.dumps(plain(vars(shown["Hz"]))))["harmonic_of"] is None
 
 
 def test_many_places_are_not_all_told() -> None:

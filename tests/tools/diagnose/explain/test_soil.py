@@ -15,7 +15,7 @@ from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.diagnose.explain import learnt
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.result import Quantity
-from gritd.tools.diagnose.explain.soil import _beside_prior, _soil_of, _told
+from gritd.tools.diagnose.explain.soil import _beside_prior, _quantity, _soil_of
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.model import Model, sized_model
 from gritd.tools.diagnose.fit.problem import Problem
@@ -36,7 +36,7 @@ def test_a_bed_prepared_anew_has_its_own_soil() -> None:
     """c of the reference 1000 e^0.2, changed by e^0.1; both σ count, and their covariance."""
     rig = _rig(C, Constant("new_c", 0.0, 0.1, changes="c"))
     mean, spread = np.array([1.0, 1.0]), np.array([[0.04, -0.01], [-0.01, 0.25]])
-    told = _told(rig, C, mean, spread)
+    told = _quantity(rig, C, mean, spread)
 
     value = 1000.0 * np.exp(0.3)
     relative = np.sqrt(0.2**2 * 0.04 + 0.1**2 * 0.25 - 2.0 * 0.2 * 0.1 * 0.01)
@@ -60,7 +60,9 @@ def test_a_soil_that_contradicts_what_was_known_is_as_uncertain_as_that(
 
 
 def test_one_bed_has_one_soil() -> None:
-    told = _told(_rig(C, Constant("zero", 0.0, 0.1)), C, np.array([0.5, 3.0]), np.diag([0.09, 1.0]))
+    told = _quantity(
+        _rig(C, Constant("zero", 0.0, 0.1)), C, np.array([0.5, 3.0]), np.diag([0.09, 1.0])
+    )
     assert told.value == pytest.approx(1000.0 * np.exp(0.1))
     assert told.sigma == pytest.approx(told.value * 0.2 * 0.3)
 
@@ -84,7 +86,7 @@ def test_what_the_reference_shows_is_no_exact_form() -> None:
     problem, model = _fitted()
     rig, (mean, spread) = problem.stack.rig, model.constants()
     for known in (k for k in rig.constants if k.name in ("c", "tan_phi")):
-        exact = _told(rig, known, mean, spread)
+        exact = _quantity(rig, known, mean, spread)
         told = _soil_of(problem, model)[known.name]
         assert told.sigma > 1.1 * exact.sigma
         assert abs(told.value - exact.value) < 2.0 * told.sigma

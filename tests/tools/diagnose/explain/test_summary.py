@@ -31,8 +31,8 @@ def _decision(verdict: str, *names: str, **more: Any) -> Any:
 
 
 def test_it_begins_with_the_place_and_the_error_on_unseen_runs_before_and_after() -> None:
-    told = summary(_decision("explained", "a"), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
-    place, _, names = told.partition(";")
+    shown = summary(_decision("explained", "a"), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
+    place, _, names = shown.partition(";")
     assert place.startswith(PLACE.where)
     assert names.index("0.3") < names.index("0.02") < names.index("90 %")
 
@@ -41,15 +41,15 @@ def test_a_channel_that_is_foretold_worse_comes_first() -> None:
     """A torque that is mapped to the wrong side of a friction."""
     fit = _fit((0.16, 0.27))
     assert worse(fit) == ["torque"] and not worse(_fit((0.3, 0.02)))
-    told = summary(_decision("explained", "a"), [PLACE], fit, SCREEN, RIG)
-    assert told.startswith("In part only: torque") and "0.16" in told and "0.27" in told
+    shown = summary(_decision("explained", "a"), [PLACE], fit, SCREEN, RIG)
+    assert shown.startswith("In part only: torque") and "0.16" in shown and "0.27" in shown
 
 
 @pytest.mark.parametrize("names", [("a",), ("a", "b")])
 def test_it_says_which_name_has_rivals(names: tuple[str, ...]) -> None:
     decision = _decision("explained", *names, groups={names[-1]: ("d", "c")})
-    told = summary(decision, [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
-    assert "cannot be distinguished from c, d" in told
+    shown = summary(decision, [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
+    assert "cannot be distinguished from c, d" in shown
     alone = summary(_decision("explained", *names), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
     assert "told apart" not in alone
 
@@ -57,15 +57,15 @@ def test_it_says_which_name_has_rivals(names: tuple[str, ...]) -> None:
 def test_an_effect_that_must_be_bent_far_is_said_to_resemble() -> None:
     resembled = Resembled("torque_constant_error", 0.42, 0.4)
     decision = _decision("unlisted", resembled=(resembled,))
-    told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
-    assert "resembles torque_constant_error" in told and "42 %" in told and "40 %" in told
+    shown = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
+    assert "resembles torque_constant_error" in shown and "42 %" in shown and "40 %" in shown
 
 
 def test_several_that_are_likely_together_but_not_alone_are_told() -> None:
     likely = {"b": 0.26, "a": 0.3, "c": 0.17, "d": 0.01}
     decision = _decision("unlisted", probability=likely, unlisted=0.31)
-    told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
-    assert "a, b, c" in told and "73 %" in told and "31 %" in told
+    shown = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
+    assert "a, b, c" in shown and "73 %" in shown and "31 %" in shown
     alone = _decision("unlisted", probability={"a": 0.3, "b": 0.01}, unlisted=0.69)
     assert "No listed effect" in summary(alone, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
 

@@ -22,11 +22,11 @@ def stack() -> Stack:
 
 
 def test_a_misfit_that_is_one_in_every_run_is_told_once(stack: Stack) -> None:
-    told = sentence(stack, np.full(stack.size, 0.5), BY_RUN, "run", 0.99)
-    assert told.startswith("Torque, in all runs 0.50 N·m more than the model")
+    shown = sentence(stack, np.full(stack.size, 0.5), BY_RUN, "run", 0.99)
+    assert shown.startswith("Torque, in all runs 0.50 N·m more than the model")
 
 
 def test_one_that_differs_from_run_to_run_is_told_of_each(stack: Stack) -> None:
-    told = sentence(stack, 0.1 * (1.0 + stack.run), BY_RUN, "run", 0.99)
-    assert "from run to run" in told
-    assert "0.10 N·m more" in told and "0.30 N·m more" in told
+    shown = sentence(stack, 0.1 * (1.0 + stack.run), BY_RUN, "run", 0.99)
+    assert "from run to run" in shown
+    assert "0.10 N·m more" in shown and "0.30 N·m more" in shown

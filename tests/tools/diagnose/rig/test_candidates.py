@@ -72,8 +72,8 @@ def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[
 
 def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals]) -> None:
     """Its scatter was drawn by an importer: trends, places and ripples of it are nobody's."""
-    told = [replace(run, info=replace(run.info, steady_states=True)) for run in driven]
-    rig, as_driven = wheel_rig(told, settings()), wheel_rig(driven, settings())
+    shown = [replace(run, info=replace(run.info, steady_states=True)) for run in driven]
+    rig, as_driven = wheel_rig(shown, settings()), wheel_rig(driven, settings())
     assert "gear_ripple" in as_driven.effects and "gear_ripple" not in rig.effects
     assert highest_order(Stack(as_driven)) > 0.0 == highest_order(Stack(rig))
     along = {along for s in smooth_signatures(Stack(rig)) for along in s.shape.along}

@@ -49,9 +49,9 @@ def test_the_error_of_a_mean_load_counts_the_colour_of_its_noise() -> None:
     """Ten times what white noise of this size would leave, and about what slow noise does."""
     rng = np.random.default_rng(2)
     runs = [LEVEL + _slow_noise(1.0, rng, 400) for _ in range(200)]
-    told = float(np.median([error_of_level(run) for run in runs]))
+    shown = float(np.median([error_of_level(run) for run in runs]))
     true = float(np.std([run.mean() for run in runs])) / LEVEL
-    assert told == pytest.approx(true, rel=0.3)
+    assert shown == pytest.approx(true, rel=0.3)
     assert error_of_level(runs[0][:5]) == 0.0
 
 

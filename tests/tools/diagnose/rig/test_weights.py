@@ -54,21 +54,21 @@ def test_a_lifted_wheel_is_no_contradiction() -> None:
 
 
 def test_where_one_run_tells_no_weights_the_sensor_tells_those_of_all() -> None:
-    told = weights_in([run(1.06 * NOMINAL, NOMINAL), run(0.7 * NOMINAL, None)], SETTINGS)
-    assert [one.known for one in told] == [False, False]
-    assert told[0].values == pytest.approx(1.06 * NOMINAL, rel=5e-3)
+    shown = weights_in([run(1.06 * NOMINAL, NOMINAL), run(0.7 * NOMINAL, None)], SETTINGS)
+    assert [one.known for one in shown] == [False, False]
+    assert shown[0].values == pytest.approx(1.06 * NOMINAL, rel=5e-3)
 
 
 def test_stated_weights_stay_where_all_runs_state_theirs() -> None:
-    told = weights_in([run(NOMINAL, NOMINAL), run(0.7 * NOMINAL, 0.7 * NOMINAL)], SETTINGS)
-    assert all(one.known for one in told)
+    shown = weights_in([run(NOMINAL, NOMINAL), run(0.7 * NOMINAL, 0.7 * NOMINAL)], SETTINGS)
+    assert all(one.known for one in shown)
 
 
 def test_a_sensor_that_was_silent_for_most_of_a_run_does_not_tell_its_weights() -> None:
     silent = run(0.98 * NOMINAL, NOMINAL)
     silent.analogue["load"][3:] = np.nan
-    told = weights_in([silent, run(0.7 * NOMINAL, None)], SETTINGS)
-    assert told[0].values == pytest.approx(NOMINAL) and told[0].load is None
+    shown = weights_in([silent, run(0.7 * NOMINAL, None)], SETTINGS)
+    assert shown[0].values == pytest.approx(NOMINAL) and shown[0].load is None
 
 
 def test_what_the_wheel_feels_follows_a_friction_that_turns_round() -> None:
@@ -87,9 +87,9 @@ def test_the_noise_that_is_left_of_a_steady_load_is_told() -> None:
     steady = 60.0 + np.random.default_rng(4).normal(0.0, 0.1, 20000)
     values, sigma = felt(0.1 * np.arange(20000), steady)
     scatter = np.std((values - 60.0).reshape(-1, 50).mean(axis=1))
-    told = np.median(sigma) / np.sqrt(50)
+    shown = np.median(sigma) / np.sqrt(50)
     assert np.std(values - 60.0) < 0.4 * 0.1
-    assert 0.85 < scatter / told < 1.15
+    assert 0.85 < scatter / shown < 1.15
 
 
 def test_the_rounding_of_a_load_in_steps_of_its_sensor_is_told() -> None:
@@ -107,8 +107,8 @@ def test_the_loads_of_a_table_of_steady_states_are_the_means_of_its_rows() -> No
     table.analogue["load"] = rows + np.random.default_rng(4).normal(0.0, 4.0, TIME.size)
     table.wheel_speed[np.arange(TIME.size) % 20 >= 10] = np.nan
 
-    told = weights_of(table, SETTINGS)
+    shown = weights_of(table, SETTINGS)
     known = np.isfinite(table.wheel_speed)
-    assert np.abs(told.values - rows)[known].max() < 5.0
-    assert len(np.unique(told.values[known])) == row.max() + 1
-    assert np.mean(np.abs(told.values - rows)[known] < 4.0 * np.asarray(told.sigma)[known]) > 0.9
+    assert np.abs(shown.values - rows)[known].max() < 5.0
+    assert len(np.unique(shown.values[known])) == row.max() + 1
+    assert np.mean(np.abs(shown.values - rows)[known] < 4.0 * np.asarray(shown.sigma)[known]) > 0.9

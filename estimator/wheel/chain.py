@@ -83,16 +83,13 @@ class Added(NamedTuple):
 class Undone(NamedTuple):
     """What a window measures once the effects are accounted for, SI."""
 
-    wheel_speed: float  # [rad/s]
+    situation: Complete  # with the torque at the axle, drivetrain undone
     travel_speed: float  # [m/s]
     travel_doubt: float  # standard deviation by what effects make of it
     sinkage: float  # of the rim in the soil [m]
-    torque: float  # at the axle, drivetrain undone [N·m]
     load: float  # carried by the rim [N]
     load_doubt: float  # standard deviation by what effects make of it
-    drawbar_pull: float  # [N]
     here: Here
-    situation: Complete
 
 
 class Chain:
@@ -128,11 +125,10 @@ class Chain:
         powered = advanced(
             Powered, as_read, current=true.current, carried=carried, sinkage=true.sinkage
         )
-        torque = self._torque(true, powered)
         situation = advanced(
             Complete,
             powered,
-            torque=torque,
+            torque=self._torque(true, powered),
             drawbar_pull=true.drawbar_pull,
             theta_1=entry_angle(self.wheel.radius, float(true.sinkage)).value,
         )
@@ -142,16 +138,13 @@ class Chain:
         slip, load = self._answered(situation, present)
 
         return Undone(
-            wheel_speed=float(situation.wheel_speed),
+            situation=situation,
             travel_speed=(travel := _travel_speed(situation, slip)),
             travel_doubt=LAGGED * abs(travel - float(situation.carriage_speed)),
             sinkage=float(true.sinkage - (felt.sinkage - situation.sinkage)),
-            torque=float(torque),
             load=load,
             load_doubt=LAGGED * abs(load - present),
-            drawbar_pull=float(true.drawbar_pull),
             here=self._here(situation, context),
-            situation=situation,
         )
 
     def felt(

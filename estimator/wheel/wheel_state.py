@@ -126,19 +126,20 @@ def _without_effects(
 ) -> WheelState:
     """The window once `Chain.undo` has taken out what effects do to it."""
     undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
+    situation = undone.situation
     true = snapshot._replace(
-        wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
+        wheel_speed=snapshot.wheel_speed._replace(value=float(situation.wheel_speed)),
         carriage_speed=_doubted(snapshot.carriage_speed, undone.travel_speed, undone.travel_doubt),
         sinkage=snapshot.sinkage._replace(value=undone.sinkage),
-        drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
+        drawbar_pull=snapshot.drawbar_pull._replace(value=float(situation.drawbar_pull)),
     )
     now = _as_read(replace(settings, wheel=chain.wheel), true)
 
     return now._replace(
-        torque=now.torque._replace(value=undone.torque),
+        torque=now.torque._replace(value=float(situation.torque)),
         load=_doubted(now.load, undone.load, undone.load_doubt),
         here=undone.here,
-        situation=undone.situation,
+        situation=situation,
         doubts=(_slip_doubt(now, undone.travel_doubt), undone.load_doubt),
         read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
     )

@@ -130,7 +130,7 @@ class _Channel:
 
     def support(self, axis: str, at: float) -> float:
         """Evidence [nats] of a line and its next harmonics in the readings as they were."""
-        times = np.arange(1, TUNING.orders.supporting + 1)
+        times = np.arange(1, TUNING.orders.harmonics + 1)
         near = [self._near(self._first[axis], axis, float(k * at)).min(initial=0.0) for k in times]
         return float(np.sum(np.maximum(-np.array(near) - TUNING.orders.supports, 0.0)))
 
@@ -275,7 +275,7 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
                 log_p = channel.near(axis, at) + np.log(len(channels))
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
-                lines += [] if _rest(line, lines) else [line, *_overtones(channel, line, len(runs))]
+                lines += [line, *_overtones(channel, line, len(runs))]
     return tuple(_with_harmonics(lines, channels))
 
 
@@ -303,16 +303,6 @@ def _overtones(channel: _Channel, line: SpectralLine, runs: int) -> Iterator[Spe
         if log_p <= np.log(TUNING.orders.level):
             at = channel.refined(line.axis, round(at / channel.places[line.axis].spacing))
             yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
-
-
-def _rest(line: SpectralLine, louder: Sequence[SpectralLine]) -> bool:
-    """Whether it is what is left about a louder line, whose size changes within a stretch."""
-    return any(
-        (other.channel, other.axis) == (line.channel, line.axis)
-        and line.size < TUNING.orders.rest * other.size
-        and abs(line.at - other.at) < TUNING.orders.rest_cells * line.cell
-        for other in louder
-    )
 
 
 def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:

@@ -35,15 +35,12 @@ class Orders:
 
     # --- lines.py ---
     level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
-    rest: float = tuned(0.03, "-", "of a louder line near by: what is left about it")
-    rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
     sweeps: int = tuned(3, "times", "all lines of a channel are estimated anew beside another")
     refinements: int = tuned(8, "times", "a line's place is looked for more finely")
     prefer_angle: float = tuned(
         3.0, "nats", "at one speed a ripple of the wheel is also one in time: the wheel's is meant"
     )
-    supporting: int = tuned(3, "times", "an order, whose evidence supports it as a count")
     supports: float = tuned(2.0, "nats", "of each: less is chance, three places are tried in each")
     behind: float = tuned(10.0, "nats", "of support: orders so far behind the best are no count")
     known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")

@@ -141,7 +141,8 @@ def _long(stack: Stack, channel: str) -> Array:
     index, x = np.concatenate(parts), stack.covariate("position")
     longest = max(float(np.ptp(x[part])) for part in parts)
     beyond = (TUNING.orders.cycles + TUNING.orders.near + 1.0) / longest
-    shapes = waves(x[index], tried[tried < beyond][: TUNING.noise.long_waves])
+    most = 1 + int(TUNING.noise.line_density * (TUNING.orders.near + 1.0))
+    shapes = waves(x[index], tried[tried < beyond][:most])
     out = np.zeros((stack.size, 2 * shapes.shape[1]))
     out[index] = shapes.reshape(index.size, -1)
     return out

@@ -31,7 +31,7 @@ def weight_sets(loads: Sequence[Array]) -> WeightSets:
     values, count = np.unique(np.concatenate(loads), return_counts=True)
     held = values[(count >= TUNING.rig.encoder_readings) & (values > 0.0)]
     sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.least_weights) + 1)
-    if not 1 < len(sets) <= TUNING.rig.most_sets:
+    if not 1 < len(sets) <= TUNING.noise.most_cells:
         none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
         return WeightSets((), none)
     middle = np.array([one.mean() for one in sets])

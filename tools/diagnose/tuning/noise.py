@@ -73,14 +73,13 @@ class NoiseTuning:
         2.0, "-", "frequencies tried in each that the longest stretch resolves"
     )
     most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
-    long_waves: int = tuned(6, "waves", "of the bed that are too long to have neighbours, at most")
 
     # --- replicates.py ---
     cell_widths: Mapping[str, float] = tuned(
         CELLS, "-", "of a cell of equal conditions; of speed and load relative to their largest"
     )
     cell_values: int = tuned(10, "values", "a cell must hold")
-    most_cells: int = tuned(60, "cells", "of a channel, at most")
+    most_cells: int = tuned(60, "cells", "of a channel, or loads, at most")
     cell_phases: tuple[float, ...] = tuned(
         (0.5, 0.75, 0.0, 0.25), "choice", "of the edges of cells, in their widths"
     )

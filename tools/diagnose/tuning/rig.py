@@ -122,7 +122,6 @@ class RigTuning:
     unrest_largest: float = tuned(0.03, "-", "usual unrest: more is no noise of a speed sensor")
 
     # --- weight_sets.py ---
-    most_sets: int = tuned(60, "sets", "at most", "run time")
 
     # --- weights.py ---
     close_load: float = tuned(

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,11 +31,7 @@ class Campaign:
         self._settings, self._channels = settings, tuple(channels)
         self._motions = [_filled(motion) for motion in motions]
 
-        ends = np.cumsum([np.size(m.time) for m in self._motions])
-        self.parts = [
-            slice(end - np.size(m.time), end) for m, end in zip(self._motions, ends, strict=True)
-        ]
-
+        self.parts = parts_of(self._motions)
         self._joined = _joined(self._motions)
         self._carried: dict[Hashable, Carried] = {}  # the last few
         self._last: Balance | None = None  # the next balance starts there
@@ -89,6 +86,12 @@ class Campaign:
         constant = self._settings.drive.torque_constant.value
         sensed = responded(solved, effects, torque_constant=constant).sensed
         return np.stack([sensed_as(sensed, c, self._settings) for c in self._channels])
+
+
+def parts_of(motions: Sequence[Motion]) -> list[slice]:
+    """Where each run lies in the vector (N,) of all."""
+    ends = np.cumsum([0, *(np.size(m.time) for m in motions)])
+    return [slice(*pair) for pair in pairwise(ends.tolist())]
 
 
 def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:

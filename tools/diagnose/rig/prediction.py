@@ -14,7 +14,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
+from gritd.tools.diagnose.rig.campaign import Campaign, parts_of, sensed_as
 from gritd.tools.diagnose.rig.constants import LEAN
 from gritd.tools.diagnose.rig.interface import Bools, Channels, Constant, Foreseen, Index
 from gritd.tools.diagnose.rig.proposals import driving, proposed
@@ -39,14 +39,6 @@ class Driven:
     steps: Sequence[float]
     new: Sequence[bool]
     sets: WeightSets
-
-    @property
-    def parts(self) -> list[slice]:
-        """Where each run lies in the vector (N,) of all."""
-        ends = np.cumsum([np.size(m.time) for m in self.motions])
-        return [
-            slice(end - np.size(m.time), end) for m, end in zip(self.motions, ends, strict=True)
-        ]
 
     def set_of(self, new: bool) -> Index:
         """The set of weights of each value (n,) of the new campaign, or of the reference."""
@@ -80,7 +72,7 @@ class Prediction:
         self._campaigns = _campaigns(driven, settings, channels)
         self._true_readings: dict[tuple[object, ...], Array] = {}  # the last few
 
-        self._parts = driven.parts
+        self._parts = parts_of(driven.motions)
         sizes = [part.stop - part.start for part in self._parts]
         self._load = np.concatenate([m.load * np.ones(np.size(m.time)) for m in driven.motions])
         self._step: Array = np.repeat(driven.steps, sizes)

@@ -13,6 +13,7 @@ from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.candidates import steady_states, unbroken
+from gritd.tools.diagnose.rig.recorded import filled
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -87,7 +88,7 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
     if np.mean(np.isfinite(measured)) < 0.5:
         return None
 
-    load = _bridged(measured)
+    load = filled(measured)
     if steady_states(signals):  # one after the other, they have nothing in common
         values, sigma = _of_rows(signals, load)
         return Weights(values, values, False, load, sigma)
@@ -170,9 +171,3 @@ def _noise(values: Array) -> float:
     steps = np.abs(np.diff(values))
     rounding = float(steps[steps > 0.0].min() / np.sqrt(12.0)) if np.any(steps) else 0.0
     return max(float(NORMAL * np.median(steps) / np.sqrt(2.0)), rounding)
-
-
-def _bridged(values: Array) -> Array:
-    good = np.isfinite(values)
-    at = np.arange(values.size)
-    return np.interp(at, at[good], values[good])

@@ -113,7 +113,8 @@ def wheel_rig(
     data = _recorded(signals, settings, reference, read_off)
     known = [effect.name for effect in settings.effects]
     settings = replace(settings, effects=_acting(settings.effects, data.stated))
-    acting = replace(settings, effects=(*settings.effects, *_acting(had, data.stated)))
+    had = _acting(had, data.stated)
+    acting = replace(settings, effects=(*settings.effects, *had))
 
     anew, tabled = bool(reference) and bed == "prepared", tables(signals)
     prepared = preparation(settings) if anew else {}
@@ -153,12 +154,7 @@ def wheel_rig(
         effects=candidates(signals, _left_out(known, data.stated)),
         new=data.driven.new,
         predict=prediction.channels,
-        words=RigWords(
-            tuple(_sentences(data, settings, holding)),
-            MENU,
-            tuple(_shortcomings(runs, data.channels)),
-            _law(radius, data.loss),
-        ),
+        words=_words(data, settings, runs, holding),
         smooth=SMOOTH,
         heated=("torque",),
         aside=prediction.aside,
@@ -235,6 +231,12 @@ def _partial(sets: WeightSets) -> dict[str, tuple[str, Sequence[Bools]]]:
 
 
 # ---- what is said --------------------------------------------------------------------------------
+
+
+def _words(data: _Recorded, settings: Settings, runs: Sequence[GridRun], holding: bool) -> RigWords:
+    caveats = tuple(_sentences(data, settings, holding))
+    shortcomings = tuple(_shortcomings(runs, data.channels))
+    return RigWords(caveats, MENU, shortcomings, _law(settings.wheel.radius, data.loss))
 
 
 def _law(radius: float, loss: bool) -> LawForm:

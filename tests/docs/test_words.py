@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[2]
 OUT = {
     r"had anyway": "baseline effects",
     r"habit": "reference score",
+    r"allowances?": "nuisance columns",
     r"functions? without a name": "unexplained term",
     r"let go": "released",
     r"out of all measure": "above the reset threshold",

@@ -88,9 +88,9 @@ def problem_of(search: EffectSearch, model: Model) -> Problem:
     """The recordings, with what the model's fit was allowed."""
     if model.marginal is None:
         return search.problem
-    freedoms = model.marginal.freedoms
-    sizes = [f.sizes.values[n] for f, n in zip(freedoms, model.chosen, strict=True)]
-    return search.problem.with_freedoms(freedoms, sizes)
+    terms = model.marginal.terms
+    sizes = [f.sizes.values[n] for f, n in zip(terms, model.chosen, strict=True)]
+    return search.problem.with_terms(terms, sizes)
 
 
 def optimised(problem: Problem, model: Model, start: Array) -> float:
@@ -126,15 +126,15 @@ def _residuals(ground: EffectsObjective, problem: Problem, centre: Array) -> Arr
     weights = ground.penalty[: centre.size]
     if not np.isfinite(nats):
         return np.full(tried.residual.size + tried.slack.size + centre.size, FAR)
-    left = tried.residual - problem.allowance.times(tried.slack)
+    left = tried.residual - problem.nuisance.times(tried.slack)
     return np.concatenate((left, tried.slack, weights * centre))
 
 
 def _slopes(ground: EffectsObjective, problem: Problem, centre: Array) -> Array:
     """Their derivatives; what is allowed follows every move, so it is eliminated exactly."""
     own = ground.linearised(ground.tried(centre)[0]).own
-    follows = cho_solve((problem.root, True), problem.allowance.pulled(own), check_finite=False)
-    left = own - problem.allowance.times(follows)
+    follows = cho_solve((problem.root, True), problem.nuisance.pulled(own), check_finite=False)
+    left = own - problem.nuisance.times(follows)
     return np.vstack((-left, -follows, np.diag(ground.penalty[: centre.size])))
 
 

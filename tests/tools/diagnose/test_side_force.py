@@ -32,7 +32,7 @@ def skewed(tmp_path_factory: pytest.TempPathFactory) -> tuple[BlindCase, list[Pa
     return case, recordings, load(folder / CONFIGURATION).settings
 
 
-def told(settings: Settings, scale: float) -> Settings:
+def shown(settings: Settings, scale: float) -> Settings:
     """With a calibration of fy."""
     assert settings.wrench is not None
     known = Calibration(Uncertain(scale, 0.002), Uncertain(0.0, settings.wrench.force_noise))
@@ -44,7 +44,7 @@ def test_soil_and_wheel_have_no_left_and_right(
 ) -> None:
     _, files, settings = skewed
     recordings = read_all(files)
-    left, right = (rig_of(recordings, told(settings, s))[0].runs for s in (1.0, -1.0))
+    left, right = (rig_of(recordings, shown(settings, s))[0].runs for s in (1.0, -1.0))
     for one, other in zip(left, right, strict=True):
         used = one.used["side_force"]
         np.testing.assert_array_equal(used, other.used["side_force"])
@@ -78,7 +78,7 @@ def test_a_skewed_wheel_is_named_by_its_side_force(
     skewed: tuple[BlindCase, list[Path], Settings],
 ) -> None:
     case, files, settings = skewed
-    found = diagnose(rig_of(read_all(files), told(settings, 1.0))[0])
+    found = diagnose(rig_of(read_all(files), shown(settings, 1.0))[0])
     first = found.hypotheses[0]
     assert (found.verdict, first.effect) == ("explained", "side_slip")
     angle = first.parameters["angle"]

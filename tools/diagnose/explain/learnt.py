@@ -79,7 +79,7 @@ class _Unknowns:
     ) -> None:
         rig, marginal, fitted = problem.stack.rig, model.marginal, model.fitted
         assert marginal is not None
-        names = [f.name for f in marginal.freedoms]
+        names = [f.name for f in marginal.terms]
         self.numbers = {s.name: names.index(s.name) for s in sources}
         self.places: list[slice] = []  # of each freedom
         parts, known = [np.arange(len(fitted.centre))], len(fitted.centre)
@@ -138,7 +138,7 @@ def _source(
     assert marginal is not None
     number, rows = unknowns.numbers[source.name], _acting(stack, source)
     whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
-    for freedom, place in zip(marginal.freedoms, unknowns.places, strict=True):
+    for freedom, place in zip(marginal.terms, unknowns.places, strict=True):
         whole[:, place] = freedom.columns[rows]
     end = unknowns.places[number].stop  # what goes with the wheel's angle stands last
     whole[:, end - 2 * len(TUNING.fit.form_harmonics) : end] = 0.0

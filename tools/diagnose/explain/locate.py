@@ -92,7 +92,7 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
     the misfit, and what is left shows where they cannot follow, not where the misfit was made. With
     a reference campaign, what both campaigns do is none of it.
     """
-    fit, allowance = accepted.fitted, screening.problem.allowance
+    fit, nuisance = accepted.fitted, screening.problem.nuisance
     alone = screening.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
     own, whitened = accepted.discrepancy()
     if screening.problem.stack.referred:
@@ -103,8 +103,8 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
         u=np.zeros_like(fit.u),
         own=np.zeros_like(alone.own),
         pulled=np.zeros_like(alone.pulled),
-        allowance=alone.allowance.without_size(),
-        residual=alone.residual - allowance.times(fit.slack[: allowance.count]),
+        nuisance=alone.nuisance.without_size(),
+        residual=alone.residual - nuisance.times(fit.slack[: nuisance.count]),
     )
     return Model(held)
 

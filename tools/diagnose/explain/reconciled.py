@@ -21,10 +21,10 @@ from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 def reconciled(mean: float, sigma: float) -> tuple[float, float]:
     """Mean and σ in units of the prior σ, about the prior's mean, from those of a Gaussian fit."""
-    told = 1.0 / sigma**2 - 1.0 if sigma > 0.0 else np.inf  # by the recordings: precision
-    if not SLIGHT < told < 1.0 / SLIGHT:
+    precision = 1.0 / sigma**2 - 1.0 if sigma > 0.0 else np.inf  # by the recordings: precision
+    if not SLIGHT < precision < 1.0 / SLIGHT:
         return mean, sigma
-    value, own = mean * (1.0 + told) / told, told**-0.5
+    value, own = mean * (1.0 + precision) / precision, precision**-0.5
 
     at = _points(value, own)
     density = _prior(at) * _student((at - value) / own)
@@ -50,5 +50,5 @@ def _normal(at: Array) -> Array:
 
 
 def _student(at: Array) -> Array:
-    freedom = TUNING.explain.told_freedom
+    freedom = TUNING.explain.precision_freedom
     return np.asarray((1.0 + at**2 / freedom) ** (-0.5 * (freedom + 1.0)))

@@ -75,9 +75,9 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
     stack, rig, marginal = problem.stack, problem.stack.rig, model.marginal
     squares, learnt = np.zeros(stack.size), "prior"
 
-    if marginal is not None and marginal.freedoms:
+    if marginal is not None and marginal.terms:
         learnt = "reference" if stack.referred else "recordings"
-        for number, freedom in enumerate(marginal.freedoms):
+        for number, freedom in enumerate(marginal.terms):
             size = marginal.size_of(model.chosen, number)
             squares += size**2 * np.sum(freedom.columns**2, axis=1)
 

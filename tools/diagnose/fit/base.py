@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms, of_differences
+from gritd.tools.diagnose.fit.discrepancy import form_terms, of_differences
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.fit.random_effect import Freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
 from gritd.tools.diagnose.noise.colour import Noise
@@ -31,7 +31,7 @@ class BaseFit:
 
     problem: Problem
     model: Model
-    forms: tuple[Freedom, ...] = ()  # what the form of the model may be off by
+    forms: tuple[RandomEffect, ...] = ()  # what the form of the model may be off by
 
     @property
     def fitted(self) -> Fitted:
@@ -70,30 +70,32 @@ def refit(rough: BaseFit, noise: Noise) -> BaseFit:
     """In the noise that was found, what each run does for itself allowed."""
     problem = in_noise(rough, noise)
     fitted = problem.descend((), (), rough.fitted.u, np.zeros(0))
-    return BaseFit(problem, plain_model(problem, fitted), form_freedoms(problem.stack, noise))
+    return BaseFit(problem, plain_model(problem, fitted), form_terms(problem.stack, noise))
 
 
-def refit_beside(rough: BaseFit, noise: Noise, more: Sequence[Freedom]) -> BaseFit:
-    """In the noise that was found, the discrepancy of form and more freedoms learnt from both
+def refit_beside(rough: BaseFit, noise: Noise, more: Sequence[RandomEffect]) -> BaseFit:
+    """In the noise that was found, the discrepancy of form and more terms learnt from both
     campaigns together.
     """
     problem = in_noise(rough, noise)
-    forms = (*form_freedoms(problem.stack, noise), *more)
+    forms = (*form_terms(problem.stack, noise), *more)
     start = (rough.fitted.u, np.zeros(0))
     model = fit_model(problem, forms, (), (), start, tuple(0 for _ in forms))
     return BaseFit(problem, model, forms)
 
 
-def sized_beside(start: BaseFit, noise: Noise, more: Sequence[Freedom], sizes: Chosen) -> BaseFit:
-    """The same with given sizes of all freedoms."""
+def sized_beside(
+    start: BaseFit, noise: Noise, more: Sequence[RandomEffect], sizes: Chosen
+) -> BaseFit:
+    """The same with given sizes of all terms."""
     problem = in_noise(start, noise)
-    forms = (*form_freedoms(problem.stack, noise), *more)
+    forms = (*form_terms(problem.stack, noise), *more)
     begins = (start.fitted.u, np.zeros(0))
     return BaseFit(problem, sized_model(problem, forms, begins, sizes), forms)
 
 
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:
-    """Without freedoms, what each run does for itself allowed."""
+    """Without terms, what each run does for itself allowed."""
     stack = rough.problem.stack
     return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack))))
 

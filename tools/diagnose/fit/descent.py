@@ -107,12 +107,12 @@ def descend(
         held, better = ground.bounds.held(here.centre, here.gradient), None
         while better is None and damping < TUNING.fit.damping_most:
             step = bounded_step(here, ground.bounds, held, damping)
-            foretold = _gain(here, step)
-            small = abs(foretold) < TUNING.fit.gain
+            expected = _gain(here, step)
+            small = abs(expected) < TUNING.fit.gain
 
             tried, share, bent = None, 0.0, False
-            if not small and foretold > 0.0:  # bounds may cut a step into one that loses
-                tried, share, bent = _attempt(ground, here, step, foretold, damping)
+            if not small and expected > 0.0:  # bounds may cut a step into one that loses
+                tried, share, bent = _attempt(ground, here, step, expected, damping)
 
             if share > TUNING.fit.fulfilled:
                 better, again = tried, False
@@ -131,7 +131,7 @@ def descend(
 
         if better is None:
             return here, False
-        near = foretold < TUNING.fit.near and not bent
+        near = expected < TUNING.fit.near and not bent
         if near:
             here, unsure = ground.moved(here, better), better
         elif share > TUNING.fit.good and not bent:
@@ -144,13 +144,13 @@ def descend(
 
 
 def _attempt(
-    ground: Objective[Here, Tried], here: Here, step: Array, foretold: float, damping: float
+    ground: Objective[Here, Tried], here: Here, step: Array, expected: float, damping: float
 ) -> tuple[Tried, float, bool]:
-    """Where a step (n,) leads, its share of the gain foretold [nats], and whether the step alone
+    """Where a step (n,) leads, its share of the expected gain [nats], and whether the step alone
     misses it because the valley is curved: then all that is not curved follows what is.
     """
     tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
-    share = (here.nats - nats) / foretold
+    share = (here.nats - nats) / expected
     if share > TUNING.fit.good or not np.isfinite(nats) or not ground.curved.any():
         return tried, share, share <= TUNING.fit.good
 
@@ -158,7 +158,7 @@ def _attempt(
     held = ground.curved | ground.bounds.held(there.centre, there.gradient)
     follow = bounded_step(there, ground.bounds, held, damping)
     beside, lower = ground.tried(ground.bounds.clipped(there.centre + follow))
-    return (beside, (here.nats - lower) / foretold, True) if lower < nats else (tried, share, True)
+    return (beside, (here.nats - lower) / expected, True) if lower < nats else (tried, share, True)
 
 
 def _undamped_gain(here: DescentPoint, bounds: CoordinateBounds) -> float:

@@ -1,4 +1,4 @@
-"""The discrepancy of form δ: what every model of a wheel in soil misses, as freedoms of the fit.
+"""The discrepancy of form δ: what every model of a wheel in soil misses, as terms of the fit.
 
 The size of δ is learnt from the recordings, under a prior that says how far published models miss
 published measurements of drawbar pull and torque: half of it is at 3 and 10 %. (Shibly, Iagnemma
@@ -17,26 +17,28 @@ from gritd.estimator.model.discrepancy import features_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Bools, FormSource
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
-    """A freedom for each source of the rig; none for a rig that declares none."""
-    freedoms = []
+def form_terms(stack: Stack, noise: Noise) -> tuple[RandomEffect, ...]:
+    """A term for each source of the rig; none for a rig that declares none."""
+    terms = []
     for source in stack.rig.forms:
         columns = _columns(stack, source)
         if columns.shape[1]:
             sizes = _drive_sizes() if source.drive else _form_sizes()
-            freedoms.append(freedom(source.name, columns, noise, sizes, of_form=not source.drive))
-    return tuple(freedoms)
+            terms.append(
+                random_effect(source.name, columns, noise, sizes, of_form=not source.drive)
+            )
+    return tuple(terms)
 
 
-def usual_sizes(stack: Stack, forms: Sequence[Freedom], model: Model) -> Chosen:
-    """Of each freedom which of its sizes is the largest that is no news.
+def usual_sizes(stack: Stack, forms: Sequence[RandomEffect], model: Model) -> Chosen:
+    """Of each term which of its sizes is the largest that is no news.
 
     Beside a reference, and where nothing is known of it, that is any. One that a configuration
     holds may be off, as fitted, by the share by which the published laws of an effect differ.
@@ -54,7 +56,7 @@ def usual_sizes(stack: Stack, forms: Sequence[Freedom], model: Model) -> Chosen:
 
 
 def _held(stack: Stack) -> dict[str, Array]:
-    """What a configuration holds of each freedom (N,), in the channels' units."""
+    """What a configuration holds of each term (N,), in the channels' units."""
     if stack.rig.held is None:
         return {}
     means = stack.joined(stack.rig.held.means)

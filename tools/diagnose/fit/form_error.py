@@ -1,4 +1,4 @@
-"""Other published forms of an effect, as a freedom of the fit.
+"""Other published forms of an effect, as a term of the fit.
 
 A listed effect stands for its physics, not for one formula. Another form differs from ours by a
 smooth share of what the effect does. An effect that adds S(x) to all channels may therefore add
@@ -18,7 +18,7 @@ creeps, or how it is set before each run: it may follow any smooth function, of 
 size of our formula. What the parameters of the model's effects can do is taken out of all this,
 so that a strength is what its effect does on the whole. ρ is how far published forms differ; its
 prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
-never told as if it were exact: where the soil can absorb most of an effect, another form of it
+never reported as if it were exact: where the soil can absorb most of an effect, another form of it
 changes the soil and hardly the fit.
 """
 
@@ -36,7 +36,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
@@ -54,7 +54,7 @@ def form_error_sizes() -> Sizes:
     return Sizes(TUNING.fit.form_error_sizes, TUNING.fit.form_error_prior)
 
 
-def form_errors(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
+def form_errors(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[RandomEffect, ...]:
     """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
     numbered = enumerate(fitted.acting)
     acting = [_Acting(effect, _added(stack, fitted, number)) for number, effect in numbered]
@@ -62,7 +62,7 @@ def form_errors(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ..
     return _forms_of(stack, noise, fitted, acting, own)
 
 
-def had_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
+def baseline_terms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[RandomEffect, ...]:
     """The same of each effect that the reference shows by itself, in both campaigns."""
     constants = stack.rig.constants
     own = [number for number, constant in enumerate(constants) if constant.kind == HAD]
@@ -96,13 +96,13 @@ def _had(stack: Stack, fitted: Fitted, name: str) -> _Acting:
 
 def _forms_of(
     stack: Stack, noise: Noise, fitted: Fitted, acting: Sequence[_Acting], own: Index
-) -> tuple[Freedom, ...]:
+) -> tuple[RandomEffect, ...]:
     """Other forms of effects. own: which of the fit's unknowns are their parameters."""
     if not acting:
         return ()
     functions, places = shares(stack, np.ones(stack.size, bool)), along_place(stack)
     return tuple(
-        freedom(one.effect.name, _beside(noise, columns, fitted, own), noise, sizes, least)
+        random_effect(one.effect.name, _beside(noise, columns, fitted, own), noise, sizes, least)
         for one in acting
         if np.any(one.added)
         for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places)

@@ -81,7 +81,7 @@ def shares(stack: Stack, own: Bools) -> Array:
     for along, family in _families(stack):
         if len(along) > 1 or along[0] not in ("run", "wheel_angle", "acceleration", "direction"):
             bent = len(along) == 1 and along[0] in LONG
-            columns.append(family[:, : TUNING.fit.bends] if bent else family)
+            columns.append(family[:, : TUNING.fit.cosines] if bent else family)
     return _scaled(np.column_stack(columns), own, 1.0)
 
 

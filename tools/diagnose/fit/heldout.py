@@ -73,7 +73,7 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     """Density and prediction of every fold, marked (N,), by the model fitted to the others; the
     discrepancies that it learnt are predicted too.
     """
-    own = fitted.allowance.carried
+    own = fitted.nuisance.carried
     j, r = fitted.jacobian, fitted.residual
     last = j.shape[1] - own.shape[1]
     size = len(fitted.u) + len(fitted.x)
@@ -113,8 +113,8 @@ def missed(problem: Problem, fitted: Fitted) -> float:
     """
     stack = problem.stack
     far = rmse(stack, held_out(fitted, run_folds(stack)).predicted)
-    told = zip(stack.rig.channels, problem.noise.colours, strict=True)
-    return float(np.sqrt(sum((far[channel] / colour.sigma) ** 2 for channel, colour in told)))
+    pairs = zip(stack.rig.channels, problem.noise.colours, strict=True)
+    return float(np.sqrt(sum((far[channel] / colour.sigma) ** 2 for channel, colour in pairs)))
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:

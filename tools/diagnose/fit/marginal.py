@@ -1,11 +1,11 @@
-"""The evidence of a fit, averaged over the sizes of its freedoms.
+"""The evidence of a fit, averaged over the sizes of its terms.
 
-Around its optimum a fit is linear in all its unknowns, so for any sizes of the freedoms the
+Around its optimum a fit is linear in all its unknowns, so for any sizes of the terms the
 evidence is a matter of the products of the columns, which are formed once:
 
     ln Z(s) = −½ (rᵀr + |strain|² − bᵀA⁻¹b + ln det A − ln det P),   A = CᵀC + P
 
-with the columns C (Jacobian, tolerance, freedoms times their sizes), their prior precisions P and
+with the columns C (Jacobian, tolerance, terms times their sizes), their prior precisions P and
 b = Cᵀr − P centre (Laplace's approximation: MacKay 2003, ch. 27). The strengths of effects have the
 screen's prior: several sizes, and of each effect all strengths or one alone. A parameter that
 stands at its bound is held there: it keeps the density of its prior and has no width of its own.
@@ -24,11 +24,11 @@ from scipy.linalg import cholesky, solve_triangular
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
 from gritd.tools.diagnose.fit.problem import Fitted, Free
-from gritd.tools.diagnose.fit.random_effect import Freedom, products
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, products
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 
-Chosen = tuple[int, ...]  # of each freedom, which of its sizes
+Chosen = tuple[int, ...]  # of each term, which of its sizes
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +61,16 @@ class _Varied:
 
 
 class Marginal:
-    """A fit without its freedoms, and the freedoms that it may have."""
+    """A fit without its terms, and the terms that it may have."""
 
     def __init__(
-        self, fitted: Fitted, fixed: Sequence[Freedom], freedoms: Sequence[Freedom]
+        self, fitted: Fitted, fixed: Sequence[RandomEffect], terms: Sequence[RandomEffect]
     ) -> None:
         """fixed: what every fit has."""
-        self.freedoms, known = tuple(freedoms), len(fitted.u) + len(fitted.x)
+        self.terms, known = tuple(terms), len(fitted.u) + len(fitted.x)
         self._fitted, self._fixed = fitted, tuple(fixed)
         allowed = sum(f.columns.shape[1] for f in fixed)
-        self._ends = known + np.cumsum([0, allowed, *(f.columns.shape[1] for f in freedoms)])
+        self._ends = known + np.cumsum([0, allowed, *(f.columns.shape[1] for f in terms)])
 
         size = int(self._ends[-1])
         self._centre, self._weight = np.zeros(size), np.ones(size)
@@ -88,11 +88,11 @@ class Marginal:
             if self._strong[first + i] and not fitted.held[first + i]
         ]
         self._known: dict[Chosen, float] = {}
-        self._filled: list[set[Chosen]] = [set() for _ in self.freedoms]
+        self._filled: list[set[Chosen]] = [set() for _ in self.terms]
 
-    def beside(self, freedoms: Sequence[Freedom]) -> Marginal:
-        """The same fit with further freedoms."""
-        return Marginal(self._fitted, self._fixed, (*self.freedoms, *freedoms))
+    def beside(self, terms: Sequence[RandomEffect]) -> Marginal:
+        """The same fit with further terms."""
+        return Marginal(self._fitted, self._fixed, (*self.terms, *terms))
 
     def log_evidence(self, chosen: Chosen) -> float:
         """For given sizes, their prior counted."""
@@ -101,19 +101,19 @@ class Marginal:
         return self._known[chosen]
 
     def likeliest(self, start: Chosen) -> tuple[Chosen, float]:
-        """The likeliest sizes, found one freedom at a time, and the log evidence averaged over
+        """The likeliest sizes, found one term at a time, and the log evidence averaged over
         the sizes about them.
         """
         chosen = start
         for _ in range(TUNING.fit.size_sweeps):
             before = chosen
-            for number in range(len(self.freedoms)):
+            for number in range(len(self.terms)):
                 chosen = max(self._along(chosen, number), key=self.log_evidence)
             if chosen == before:
                 break
 
         top = average = self.log_evidence(chosen)
-        for number in range(len(self.freedoms)):
+        for number in range(len(self.terms)):
             values = [self.log_evidence(c) for c in self._along(chosen, number)]
             average += float(log_sum(values)) - top
 
@@ -125,9 +125,9 @@ class Marginal:
         """What the evidence counts beyond where the fit stands [nats], for given sizes: of the step
         of constants and effect parameters to the optimum by linear algebra.
         """
-        told = np.flatnonzero(~self._held[: int(self._ends[0])])
-        mean, covariance = self._posterior(chosen, told)
-        step = mean - self._centre[told]
+        free = np.flatnonzero(~self._held[: int(self._ends[0])])
+        mean, covariance = self._posterior(chosen, free)
+        step = mean - self._centre[free]
         return float(0.5 * step @ np.linalg.solve(covariance, step))
 
     def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
@@ -138,33 +138,33 @@ class Marginal:
 
     def moments(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance (w, w) of the unknowns numbered `wanted` (w,), averaged
-        likewise. The weights of a freedom are given times its size: 0 where it does not act.
+        likewise. The weights of a term are given times its size: 0 where it does not act.
         """
         ordered, weight = self._weighed(chosen)
-        told = [
+        weighted = [
             (w, *self._posterior(c, wanted))
             for w, c in zip(weight, ordered, strict=True)
             if w > TUNING.fit.slight_size
         ]
 
-        total = sum(w for w, _, _ in told)
-        mean = sum(w * m for w, m, _ in told) / total
-        spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in told) / total
+        total = sum(w for w, _, _ in weighted)
+        mean = sum(w * m for w, m, _ in weighted) / total
+        spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in weighted) / total
         return np.asarray(mean), np.asarray(spread)
 
     def log_likelihoods(self, chosen: Chosen, number: int) -> Array:
-        """Of each size of one freedom (n,), all others as chosen, without its prior."""
+        """Of each size of one term (n,), all others as chosen, without its prior."""
         values = [self.log_evidence(c) for c in self._along(chosen, number)]
-        return np.array(values) - self.freedoms[number].sizes.log_prior
+        return np.array(values) - self.terms[number].sizes.log_prior
 
     def size_of(self, chosen: Chosen, number: int) -> float:
-        """Root mean square size of a freedom, over the sizes about the likeliest ones."""
+        """Root mean square size of a term, over the sizes about the likeliest ones."""
         ordered, weight = self._weighed(chosen)
-        values = np.array([self.freedoms[number].sizes.values[c[number]] for c in ordered])
+        values = np.array([self.terms[number].sizes.values[c[number]] for c in ordered])
         return float(np.sqrt(weight @ values**2))
 
     def place_of(self, number: int) -> Index:
-        """Which of the unknowns are the weights of a freedom (m,)."""
+        """Which of the unknowns are the weights of a term (m,)."""
         return np.arange(self._ends[1 + number], self._ends[2 + number])
 
     def last_of_tolerance(self, count: int) -> Index:
@@ -186,9 +186,9 @@ class Marginal:
         """The smallest sizes that count for what is not known. Where the equations miss one channel
         by much, no other one is right to the last digit: the soil would be bent until it seems so.
         """
-        of_form = [n for n, f in zip(chosen, self.freedoms, strict=True) if f.of_form]
+        of_form = [n for n, f in zip(chosen, self.terms, strict=True) if f.of_form]
         alike = max(of_form, default=0) - TUNING.fit.form_apart
-        return tuple(max(f.least, alike) if f.of_form else f.least for f in self.freedoms)
+        return tuple(max(f.least, alike) if f.of_form else f.least for f in self.terms)
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
@@ -215,8 +215,8 @@ class Marginal:
         return mean * sized, shared * np.outer(sized, sized)
 
     def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
-        """The same sizes but for one freedom, which has each of its own; with their evidence."""
-        count = len(self.freedoms[number].sizes.values)
+        """The same sizes but for one term, which has each of its own; with their evidence."""
+        count = len(self.terms[number].sizes.values)
         if count > 1 and chosen not in self._filled[number]:
             self._fill(chosen, number)
             self._filled[number].update(
@@ -225,9 +225,9 @@ class Marginal:
         return [(*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)]
 
     def _fill(self, chosen: Chosen, number: int) -> None:
-        """The log evidence for each size of one freedom, all others as chosen.
+        """The log evidence for each size of one term, all others as chosen.
 
-        What is not this freedom is eliminated once; in the eigenvectors of what remains of it, each
+        What is not this term is eliminated once; in the eigenvectors of what remains of it, each
         of its sizes is a matter of its eigenvalues.
         """
         begin, end = int(self._ends[1 + number]), int(self._ends[2 + number])
@@ -240,19 +240,19 @@ class Marginal:
         values = np.maximum(values, 0.0)
         turned = vectors.T @ rest.to_strong
         pulled = vectors.T @ rest.pull
-        for which, size in enumerate(self.freedoms[number].sizes.values):
+        for which, size in enumerate(self.terms[number].sizes.values):
             share = size**2 / (1.0 + size**2 * values)
             misfit = rest.misfit - share @ pulled**2
             spread = rest.spread + np.log1p(size**2 * values).sum()
             a = rest.strong - (turned * share[:, None]).T @ turned
             b = rest.strong_pull - turned.T @ (share * pulled)
             these = (*chosen[:number], which, *chosen[number + 1 :])
-            self._known[these] = self._told(these, misfit, spread, a, b, rest.centre)
+            self._known[these] = self._of_sizes(these, misfit, spread, a, b, rest.centre)
 
-    def _told(
+    def _of_sizes(
         self, chosen: Chosen, misfit: float, spread: float, a: Array, b: Array, centre: Array
     ) -> float:
-        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.freedoms, chosen, strict=True))
+        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.terms, chosen, strict=True))
         strength = strength_evidence(self._strengths, a, b, centre)
         return float(sizes - 0.5 * (misfit + spread) + strength)
 
@@ -294,18 +294,18 @@ class Marginal:
     @cached_property
     def _products(self) -> Array:
         """Of all columns and the residual with one another."""
-        return _products(self._fitted, (*self._fixed, *self.freedoms))
+        return _products(self._fitted, (*self._fixed, *self.terms))
 
     @cached_property
     def _varied(self) -> _Varied:
         """What is left where all that has but one size is eliminated."""
-        once = [True, *(len(f.sizes.values) == 1 for f in self.freedoms)]
+        once = [True, *(len(f.sizes.values) == 1 for f in self.terms)]
         begins = zip(self._ends[:-1], self._ends[1:], once, strict=True)
         usual = np.concatenate([np.arange(a, b) for a, b, same in begins if same])
         acting = ~self._held
         acting[usual] = False
 
-        scale, _ = self._scaled(tuple(0 for _ in self.freedoms))
+        scale, _ = self._scaled(tuple(0 for _ in self.terms))
         own = self._products[np.ix_(usual, usual)] * scale[usual, None] * scale[usual]
         own[np.diag_indices_from(own)] += 1.0
         root = cholesky(own, lower=True, overwrite_a=True, check_finite=False)
@@ -318,18 +318,18 @@ class Marginal:
         scale, acting = self._scaled(chosen)
         none = np.zeros(0, dtype=np.intp)
         rest = self._eliminated(scale, acting, none)
-        return self._told(
+        return self._of_sizes(
             chosen, rest.misfit, rest.spread, rest.strong, rest.strong_pull, rest.centre
         )
 
     def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:
         """Factors of all columns and the residual; which columns act."""
         scale, acting = np.ones(len(self._centre) + 1), np.ones(len(self._centre), bool)
-        for freedom, number, first, last in zip(
-            self.freedoms, chosen, self._ends[1:-1], self._ends[2:], strict=True
+        for term, number, first, last in zip(
+            self.terms, chosen, self._ends[1:-1], self._ends[2:], strict=True
         ):
-            scale[first:last] = freedom.sizes.values[number]
-            acting[first:last] = freedom.sizes.values[number] > 0.0
+            scale[first:last] = term.sizes.values[number]
+            acting[first:last] = term.sizes.values[number] > 0.0
         return scale, acting
 
     def _strain_of_held(self) -> float:
@@ -337,15 +337,15 @@ class Marginal:
         return float(np.sum((self._weight[held] * self._centre[held]) ** 2))
 
 
-def _products(fitted: Fitted, freedoms: Sequence[Freedom]) -> Array:
-    """Of the derivatives, the columns of all freedoms, and the residual with one another."""
+def _products(fitted: Fitted, terms: Sequence[RandomEffect]) -> Array:
+    """Of the derivatives, the columns of all terms, and the residual with one another."""
     own = np.column_stack((fitted.own, fitted.residual))
-    beside = np.concatenate([f.whitened.T @ own for f in freedoms])
+    beside = np.concatenate([f.whitened.T @ own for f in terms])
     square = own.T @ own
     return np.block(
         [
             [square[:-1, :-1], beside[:, :-1].T, square[:-1, -1:]],
-            [beside[:, :-1], products(freedoms), beside[:, -1:]],
+            [beside[:, :-1], products(terms), beside[:, -1:]],
             [square[-1:, :-1], beside[:, -1:].T, square[-1:, -1:]],
         ]
     )

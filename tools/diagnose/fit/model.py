@@ -8,53 +8,53 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.form_error import form_errors, had_freedoms
+from gritd.tools.diagnose.fit.form_error import baseline_terms, form_errors
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
-from gritd.tools.diagnose.fit.random_effect import Freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
-class Bends:
-    """Other forms of a model's effects: the freedoms, and which size each has."""
+class FormErrors:
+    """Other forms of a model's effects: the terms, and which size each has."""
 
-    freedoms: tuple[Freedom, ...] = ()
+    terms: tuple[RandomEffect, ...] = ()
     sizes: Chosen = ()
 
-    def of(self, names: Sequence[str]) -> Bends:
+    def of(self, names: Sequence[str]) -> FormErrors:
         """Those of some effects."""
-        kept = [i for i, f in enumerate(self.freedoms) if f.name in names]
-        return Bends(tuple(self.freedoms[i] for i in kept), tuple(self.sizes[i] for i in kept))
+        kept = [i for i, f in enumerate(self.terms) if f.name in names]
+        return FormErrors(tuple(self.terms[i] for i in kept), tuple(self.sizes[i] for i in kept))
 
 
-NO_BENDS = Bends()
+NO_FORM_ERRORS = FormErrors()
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
     """The base model with some effects, fitted together with the constants.
 
-    fitted:   with every freedom at the size that `chosen` says; of a plain model without any.
-    evidence: log evidence, averaged over the sizes of the freedoms about these.
-    sizes:    of each freedom of form, which one.
-    bends:    of each freedom of an effect, its size: how far the effect's form differs.
+    fitted:   with every term at the size that `chosen` says; of a plain model without any.
+    evidence: log evidence, averaged over the sizes of the terms about these.
+    sizes:    of each term of form, which one.
+    form_sizes: of each term of an effect, its size: how far the effect's form differs.
     """
 
     fitted: Fitted
     names: tuple[str, ...] = ()
     evidence: float = float("nan")
     sizes: Chosen = ()
-    bends: tuple[float, ...] = ()
+    form_sizes: tuple[float, ...] = ()
     marginal: Marginal | None = None
-    chosen: Chosen = ()  # sizes of all freedoms in `marginal`
+    chosen: Chosen = ()  # sizes of all terms in `marginal`
 
     @property
-    def other_forms(self) -> Bends:
+    def other_forms(self) -> FormErrors:
         """Of the model's effects, as they were fitted."""
         first = len(self.sizes)
-        freedoms = self.marginal.freedoms if self.marginal else ()
-        return Bends(tuple(freedoms[first:]), self.chosen[first:])
+        terms = self.marginal.terms if self.marginal else ()
+        return FormErrors(tuple(terms[first:]), self.chosen[first:])
 
     def discrepancy(self) -> tuple[Array, Array]:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
@@ -70,35 +70,35 @@ class Model:
         that go as they like along some covariate.
         """
         free = {effect.name for effect in self.fitted.acting if effect.free_along}
-        return self._amount(self._of_form, len(self.fitted.allowance.parts) - 1, free)[1]
+        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, free)[1]
 
     @property
     def _of_form(self) -> int:
-        """How many freedoms of form act."""
-        freedoms = self.marginal.freedoms if self.marginal else ()
-        sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
+        """How many terms of form act."""
+        terms = self.marginal.terms if self.marginal else ()
+        sizes = _values(terms[: len(self.sizes)], self.sizes) if terms else []
         return sum(size > 0.0 for size in sizes)
 
     def _amount(
         self, begin: int, end: int, names: Collection[str] | None = None
     ) -> tuple[Array, Array]:
-        """Of the acting freedoms begin … end − 1, beside what every fit has; of some names only."""
-        allowance, slack = self.fitted.allowance, self.fitted.slack
-        ends = np.cumsum([freedom.columns.shape[1] for freedom, _ in allowance.parts])
+        """Of the acting terms begin … end − 1, beside what every fit has; of some names only."""
+        nuisance, slack = self.fitted.nuisance, self.fitted.slack
+        ends = np.cumsum([term.columns.shape[1] for term, _ in nuisance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
-            freedom, size = allowance.parts[number]
-            if names is not None and freedom.name not in names:
+            term, size = nuisance.parts[number]
+            if names is not None and term.name not in names:
                 continue
             weights = slack[ends[number - 1] : ends[number]]
-            own = own + size * (freedom.columns @ weights)
-            whitened = whitened + size * (freedom.whitened @ weights)
+            own = own + size * (term.columns @ weights)
+            whitened = whitened + size * (term.whitened @ weights)
         return own, whitened
 
     def of_forms(self, name: str) -> Array | None:
         """Log likelihood (h,) of each size by which an effect may act in another form than ours,
-        the other freedoms as chosen; None where it has no other form.
+        the other terms as chosen; None where it has no other form.
         """
         own = self._form_of(name)
         if self.marginal is None or own is None:
@@ -106,9 +106,9 @@ class Model:
         return self.marginal.log_likelihoods(self.chosen, own)
 
     def _form_of(self, name: str) -> int | None:
-        """Which freedom holds other forms of an effect: the last of its own."""
-        every = list(enumerate(self.marginal.freedoms if self.marginal else ()))
-        own = [number for number, freedom in every[len(self.sizes) :] if freedom.name == name]
+        """Which term holds other forms of an effect: the last of its own."""
+        every = list(enumerate(self.marginal.terms if self.marginal else ()))
+        own = [number for number, term in every[len(self.sizes) :] if term.name == name]
         return own[-1] if own else None
 
     def form_share(self, name: str) -> float:
@@ -120,7 +120,7 @@ class Model:
 
     def constants(self) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of
-        all freedoms: how far the forms may be off is part of what is not known of the soil.
+        all terms: how far the forms may be off is part of what is not known of the soil.
         """
         count = len(self.fitted.u)
         if self.marginal is None:
@@ -143,36 +143,36 @@ class Model:
 
 def fit_model(
     problem: Problem,
-    forms: Sequence[Freedom],
+    forms: Sequence[RandomEffect],
     effects: Sequence[Maker],
     free: Sequence[Free],
     start: tuple[Array, Array],
     sizes: Chosen,
-    bends: Bends = NO_BENDS,
+    other_forms: FormErrors = NO_FORM_ERRORS,
     near: Fitted | None = None,
 ) -> Model:
     """Fit and sizes in turns, until the sizes stay and linear algebra has little to add, a few
     rounds at most.
 
-    Every fit has the freedoms of its effects too, as far as they are known when it begins. Without
+    Every fit has the terms of its effects too, as far as they are known when it begins. Without
     the other forms that these need, it would strain the constants, to where linear algebra tells
     nothing. The other forms are made anew where the first fits ended, and then stay: of two effects
     that are nearly one, each could take the other's part from round to round.
 
-    problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
+    problem: without terms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
     a model that holds them; near: a fit whose derivatives by the constants do for a beginning.
 
     The evidence counts the objective where the fit stands. Slopes that promise more than it could
     reach, at a kink or a bound, do not count.
     """
-    every, sizes = (*forms, *bends.freedoms), (*sizes, *bends.sizes)
-    fitted = problem.with_freedoms(every, _values(every, sizes)).descend(
+    every, sizes = (*forms, *other_forms.terms), (*sizes, *other_forms.sizes)
+    fitted = problem.with_terms(every, _values(every, sizes)).descend(
         effects, free, *start, near=near
     )
     for number in range(TUNING.fit.size_rounds):
         known = every
-        if number < TUNING.fit.bent_anew or _unbent(fitted, every):
+        if number < TUNING.fit.form_rounds or _without_form_errors(fitted, every):
             every = (*forms, *form_errors(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
@@ -182,30 +182,32 @@ def fit_model(
         done = beyond < TUNING.fit.last_step
         if (done and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
             break
-        fitted = problem.with_freedoms(every, _values(every, sizes)).refit(fitted)
+        fitted = problem.with_terms(every, _values(every, sizes)).refit(fitted)
 
     names = tuple(effect.name for effect in fitted.acting)
-    of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
-    bent = tuple(_values(every[len(forms) :], of_bends))
-    return Model(fitted, names, evidence - beyond, of_forms, bent, marginal, of_fit)
+    of_forms, of_form_errors = of_fit[: len(forms)], of_fit[len(forms) :]
+    form_sizes = tuple(_values(every[len(forms) :], of_form_errors))
+    return Model(fitted, names, evidence - beyond, of_forms, form_sizes, marginal, of_fit)
 
 
-def _unbent(fitted: Fitted, freedoms: Sequence[Freedom]) -> bool:
+def _without_form_errors(fitted: Fitted, terms: Sequence[RandomEffect]) -> bool:
     """Whether an effect has left its bound since the other forms were made, and has none."""
     own = zip(fitted.free, fitted.x, strict=True)
     acting = {f.name for f, x in own if f.parameter.role == "strength" and x != 0.0}
-    return not acting <= {freedom.name for freedom in freedoms}
+    return not acting <= {term.name for term in terms}
 
 
-def _handed_on(known: Sequence[Freedom], sizes: Chosen, every: Sequence[Freedom]) -> Chosen:
-    """Of every freedom the size that it has among the known ones; the smallest where it is new."""
+def _handed_on(
+    known: Sequence[RandomEffect], sizes: Chosen, every: Sequence[RandomEffect]
+) -> Chosen:
+    """Of every term the size that it has among the known ones; the smallest where it is new."""
     of_known = dict(zip(_places(known), sizes, strict=True))
     return tuple(of_known.get(place, 0) for place in _places(every))
 
 
-def _places(freedoms: Sequence[Freedom]) -> list[tuple[str, int]]:
-    """The name of each freedom, and how many of that name stand before it."""
-    names = [f.name for f in freedoms]
+def _places(terms: Sequence[RandomEffect]) -> list[tuple[str, int]]:
+    """The name of each term, and how many of that name stand before it."""
+    names = [f.name for f in terms]
     return [(name, names[:number].count(name)) for number, name in enumerate(names)]
 
 
@@ -216,28 +218,28 @@ def with_forms_had(problem: Problem, model: Model) -> Model:
     if model.marginal is None:
         return model
     with problem.stack.rig.aside():
-        had = had_freedoms(problem.stack, problem.noise, model.fitted)
+        had = baseline_terms(problem.stack, problem.noise, model.fitted)
     chosen = (*model.chosen, *(0 for _ in had))
     return replace(model, marginal=model.marginal.beside(had), chosen=chosen) if had else model
 
 
 def sized_model(
-    problem: Problem, forms: Sequence[Freedom], start: tuple[Array, Array], sizes: Chosen
+    problem: Problem, forms: Sequence[RandomEffect], start: tuple[Array, Array], sizes: Chosen
 ) -> Model:
     """Without effects, the forms of given sizes, descended to from constants (q,) and no effect
     parameters (0,).
     """
-    fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend((), (), *start)
+    fitted = problem.with_terms(forms, _values(forms, sizes)).descend((), (), *start)
     marginal = Marginal(fitted, problem.fixed, forms)
     evidence = marginal.log_evidence(sizes) - marginal.gain(sizes)
     return Model(fitted, (), evidence, sizes, (), marginal, sizes)
 
 
 def plain_model(problem: Problem, fitted: Fitted) -> Model:
-    """A fit without freedoms, with its evidence."""
+    """A fit without terms, with its evidence."""
     names = tuple(effect.name for effect in fitted.acting)
     return Model(fitted, names, Marginal(fitted, problem.fixed, ()).likeliest(())[1])
 
 
-def _values(freedoms: Sequence[Freedom], chosen: Chosen) -> list[float]:
-    return [f.sizes.values[number] for f, number in zip(freedoms, chosen, strict=True)]
+def _values(terms: Sequence[RandomEffect], chosen: Chosen) -> list[float]:
+    return [f.sizes.values[number] for f, number in zip(terms, chosen, strict=True)]

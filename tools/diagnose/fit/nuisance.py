@@ -8,25 +8,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.random_effect import Freedom, products
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, products
 
 
 @dataclass(frozen=True, eq=False)
-class Allowance:
+class NuisanceColumns:
     """What a fit may be off by beside constants and effects: columns of unit normal weights.
 
     They are many, and most are shared between fits: so they are put together when asked for.
-    parts: freedoms and the size of each. The first one every fit has; those after it are predicted
+    parts: terms and the size of each. The first one every fit has; those after it are predicted
     elsewhere too.
     """
 
-    parts: tuple[tuple[Freedom, float], ...]
+    parts: tuple[tuple[RandomEffect, float], ...]
 
-    def with_parts(self, more: Sequence[tuple[Freedom, float]]) -> Allowance:
-        """With more freedoms, each of its size."""
+    def with_parts(self, more: Sequence[tuple[RandomEffect, float]]) -> NuisanceColumns:
+        """With more terms, each of its size."""
         return replace(self, parts=(*self.parts, *more))
 
-    def without_size(self) -> Allowance:
+    def without_size(self) -> NuisanceColumns:
         """The same columns, all nought."""
         return replace(self, parts=tuple((f, 0.0) for f, _ in self.parts))
 

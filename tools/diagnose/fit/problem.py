@@ -15,9 +15,9 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
-from gritd.tools.diagnose.fit.nuisance import Allowance
+from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.projection import Projection
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant
 from gritd.tools.diagnose.rig.stack import Stack
@@ -61,7 +61,7 @@ class Fitted:
     penalty: Array  # (q + p + t,) square root of the prior precision
     slack: Array  # (t,) fitted weights of what is allowed
     objective: float  # whitened squares and prior strain at the optimum
-    allowance: Allowance
+    nuisance: NuisanceColumns
     pulled: Array  # (t, q + p) products of what is allowed with `own`
     gradient: Array  # (q + p,) of `nats`, what is allowed fitted to each
     curvature: Array  # (q + p, q + p) likewise
@@ -84,13 +84,13 @@ class Fitted:
     @property
     def jacobian(self) -> Array:
         """(N, q + p + t) whitened."""
-        return np.column_stack((self.own, self.allowance.whitened))
+        return np.column_stack((self.own, self.nuisance.whitened))
 
     @property
     def gram(self) -> Array:
         """Products (q + p + t, q + p + t) of `jacobian`."""
         own = self.own.T @ self.own
-        return np.block([[own, self.pulled.T], [self.pulled, self.allowance.gram]])
+        return np.block([[own, self.pulled.T], [self.pulled, self.nuisance.gram]])
 
     def covariance(self) -> Array:
         """Of constants, effect parameters and what is allowed (n, n)."""
@@ -134,15 +134,15 @@ class Problem:
         off by.
         """
         self.stack, self.noise = stack, noise
-        allowed = freedom("tolerance", tolerance, noise, Sizes())
-        self.fixed: tuple[Freedom, ...] = (allowed,)  # what every fit has
-        self.allowance = Allowance(((allowed, 1.0),))
+        allowed = random_effect("tolerance", tolerance, noise, Sizes())
+        self.fixed: tuple[RandomEffect, ...] = (allowed,)  # what every fit has
+        self.nuisance = NuisanceColumns(((allowed, 1.0),))
         self.measured = whiten(noise, stack.measured)
 
     @cached_property
     def root(self) -> Array:
         """Cholesky root (t, t) of the products of what is allowed and its unit prior."""
-        gram = self.allowance.gram
+        gram = self.nuisance.gram
         gram[np.diag_indices_from(gram)] += 1.0
         return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 
@@ -150,19 +150,19 @@ class Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
         """
-        more = freedom("nameless", columns, self.noise, Sizes())
+        more = random_effect("nameless", columns, self.noise, Sizes())
         other = self._with([(more, 1.0)])
         other.fixed = (*self.fixed, more)
         return other
 
-    def with_freedoms(self, freedoms: Sequence[Freedom], sizes: Sequence[float]) -> Problem:
-        """The same with freedoms of given sizes."""
-        sized = [(f, size) for f, size in zip(freedoms, sizes, strict=True) if size > 0.0]
+    def with_terms(self, terms: Sequence[RandomEffect], sizes: Sequence[float]) -> Problem:
+        """The same with terms of given sizes."""
+        sized = [(f, size) for f, size in zip(terms, sizes, strict=True) if size > 0.0]
         return self._with(sized) if sized else self
 
-    def _with(self, parts: Sequence[tuple[Freedom, float]]) -> Problem:
+    def _with(self, parts: Sequence[tuple[RandomEffect, float]]) -> Problem:
         other = copy(self)
-        other.allowance = self.allowance.with_parts(parts)
+        other.nuisance = self.nuisance.with_parts(parts)
         other.__dict__.pop("root", None)
         return other
 
@@ -198,7 +198,7 @@ class Problem:
         return replace(fitted, converged=converged)
 
     def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
-        """The nearest optimum from where a fit with other freedoms stands, first by its slopes."""
+        """The nearest optimum from where a fit with other terms stands, first by its slopes."""
         ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
         most = TUNING.fit.rounds if rounds is None else rounds
@@ -230,7 +230,7 @@ class EffectsObjective:
         constants = problem.stack.rig.constants
         self._count = len(constants)
         weights = (np.ones(self._count), [f.weight for f in free])
-        self.penalty = np.concatenate((*weights, np.ones(problem.allowance.count)))
+        self.penalty = np.concatenate((*weights, np.ones(problem.nuisance.count)))
 
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
@@ -243,11 +243,11 @@ class EffectsObjective:
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():
-            nothing = np.zeros(problem.allowance.count)
+            nothing = np.zeros(problem.nuisance.count)
             return Tried(centre, predicted, predicted, nothing, np.inf), np.inf
         residual = problem.measured - whiten(problem.noise, predicted)
 
-        pulled = problem.allowance.pulled(residual)
+        pulled = problem.nuisance.pulled(residual)
         slack = cho_solve((problem.root, True), pulled, check_finite=False)
         strain = np.sum((self.penalty[: centre.size] * centre) ** 2)
         objective = float(residual @ residual - pulled @ slack + strain)
@@ -287,14 +287,14 @@ class EffectsObjective:
         problem = self._problem
         raw = self._derivatives(tried.centre, tried.predicted)
         own = whiten(problem.noise, raw)
-        pulled = problem.allowance.pulled(own)
+        pulled = problem.nuisance.pulled(own)
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with the derivatives of a fit that stands next to it."""
-        if here.allowance is self._problem.allowance:
+        if here.nuisance is self._problem.nuisance:
             return self._fitted(tried, here.raw, here.own, here.pulled, here.curvature)
-        pulled = self._problem.allowance.pulled(here.own)
+        pulled = self._problem.nuisance.pulled(here.own)
         return self._fitted(tried, here.raw, here.own, pulled, self._curvature(here.own, pulled))
 
     def followed(self, here: Fitted, tried: Tried) -> Fitted:
@@ -305,7 +305,7 @@ class EffectsObjective:
         more = self._derivatives(tried.centre, tried.predicted, first)
         raw = np.column_stack((here.raw[:, :first], more))
         own = np.column_stack((here.own[:, :first], whiten(problem.noise, more)))
-        pulled = problem.allowance.pulled(own)
+        pulled = problem.nuisance.pulled(own)
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def _curvature(self, own: Array, pulled: Array) -> Array:
@@ -332,7 +332,7 @@ class EffectsObjective:
             self.penalty,
             tried.slack,
             tried.objective,
-            problem.allowance,
+            problem.nuisance,
             pulled,
             gradient,
             curvature,

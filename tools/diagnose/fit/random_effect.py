@@ -1,8 +1,8 @@
 """Functions that a model may be off by, of a size that the recordings tell.
 
-A freedom is a set of columns with unit normal weights, times one size for all of them. Its size has
-a prior over a few values. The form of the model has freedoms (discrepancy.py), and so
-has every effect, whose published forms differ (form_error.py).
+A random effect, in short a term, is a set of columns with unit normal weights, times one size for
+all of them. Its size has a prior over a few values. The form of the model has terms
+(discrepancy.py), and so has every effect, whose published forms differ (form_error.py).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Sizes:
 
 
 @dataclass(frozen=True, eq=False)
-class Freedom:
+class RandomEffect:
     """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise.
 
     least: the number of the smallest size that counts for the uncertainty of the constants.
@@ -52,20 +52,20 @@ class Freedom:
     of_form: bool = False
 
 
-def freedom(
+def random_effect(
     name: str,
     columns: Array,
     noise: Noise,
     sizes: Sizes,
     least: int = 0,
     of_form: bool = False,
-) -> Freedom:
-    """The freedom of columns (N, m) in the channels' units."""
-    return Freedom(name, columns, whiten(noise, columns), sizes, least, of_form)
+) -> RandomEffect:
+    """The term of columns (N, m) in the channels' units."""
+    return RandomEffect(name, columns, whiten(noise, columns), sizes, least, of_form)
 
 
-def products(parts: Sequence[Freedom]) -> Array:
-    """WᵀW (m, m) of the whitened columns of freedoms side by side; of any two formed once, since
+def products(parts: Sequence[RandomEffect]) -> Array:
+    """WᵀW (m, m) of the whitened columns of terms side by side; of any two formed once, since
     hundreds of fits share them.
     """
     if not parts:
@@ -77,10 +77,12 @@ def products(parts: Sequence[Freedom]) -> Array:
     return np.block(rows)
 
 
-_formed: WeakKeyDictionary[Freedom, WeakKeyDictionary[Freedom, Array]] = WeakKeyDictionary()
+_formed: WeakKeyDictionary[RandomEffect, WeakKeyDictionary[RandomEffect, Array]] = (
+    WeakKeyDictionary()
+)
 
 
-def _between(a: Freedom, b: Freedom) -> Array:
+def _between(a: RandomEffect, b: RandomEffect) -> Array:
     known = _formed.setdefault(a, WeakKeyDictionary())
     if b not in known:
         known[b] = a.whitened.T @ b.whitened

@@ -19,12 +19,12 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.discrepancy import form_terms
 from gritd.tools.diagnose.fit.shared import (
     lasting,
     rippling_columns,
     shared_columns,
-    shared_freedoms,
+    shared_terms,
     without_ripples,
 )
 from gritd.tools.diagnose.noise.colour import Noise
@@ -55,7 +55,7 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
     noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(again, noise, shared, ripples)
-    more = shared_freedoms(noise, shared, ripples)
+    more = shared_terms(noise, shared, ripples)
     sizes = usual.model.sizes
     return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
 
@@ -63,23 +63,23 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
 def _of_reference(
     start: BaseFit, noise: Noise, shared: Mapping[str, Array], ripples: Array
 ) -> BaseFit:
-    """The reference alone, fitted with all its freedoms: the new campaign says nothing."""
+    """The reference alone, fitted with all its terms: the new campaign says nothing."""
     blind = replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
-    return refit_beside(start, blind, shared_freedoms(blind, shared, ripples))
+    return refit_beside(start, blind, shared_terms(blind, shared, ripples))
 
 
 def left(base: BaseFit) -> Array:
-    """What a fit leaves (N,), its freedoms counted, in the channels' units."""
+    """What a fit leaves (N,), its terms counted, in the channels' units."""
     fitted = base.fitted
-    carried = fitted.allowance.carried
-    freedoms = carried @ fitted.slack[fitted.slack.size - carried.shape[1] :]
-    return np.asarray(base.problem.stack.measured - fitted.predicted - freedoms)
+    carried = fitted.nuisance.carried
+    terms = carried @ fitted.slack[fitted.slack.size - carried.shape[1] :]
+    return np.asarray(base.problem.stack.measured - fitted.predicted - terms)
 
 
 def _least_noise(rough: BaseFit, shared: Mapping[str, Array], ripples: Array) -> Noise:
     """What no function of the form, no effect and no constant could explain of the reference."""
     stack, before = rough.problem.stack, rough.problem.noise
-    forms = [f.columns for f in form_freedoms(stack, before)]
+    forms = [f.columns for f in form_terms(stack, before)]
     whole = np.column_stack([ripples, *forms])
     leading = np.column_stack((rough.fitted.raw, *shared.values()))
     predicted = rough.fitted.predicted

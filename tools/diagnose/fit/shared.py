@@ -1,4 +1,4 @@
-"""What the rig did already: the library's own effects in both campaigns, as a freedom of the fit.
+"""What the rig did already: the library's own effects in both campaigns, as a term of the fit.
 
 With a reference campaign an effect is named for what is new. A rig of which the reference shows a
 gear's ripple, a sidewall that rubs or soil that relaxes has these in the new campaign too, and no
@@ -27,7 +27,7 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -75,7 +75,7 @@ def rippling_columns(stack: Stack, residual: Array) -> Array:
 def without_ripples(stack: Stack, residual: Array, ripples: Array) -> Array:
     """A residual (N,) less what ripples (N, r) can be of it, as its differences from one value to
     the next tell: a slow misfit hardly changes them. In each run and channel for itself. Good for
-    such differences alone: a long wave is hardly told by them.
+    such differences alone: a long wave is hardly known by them.
     """
     left = residual.copy()
     for channel, number in stack.parts:
@@ -100,27 +100,27 @@ def _least_absolute(columns: Array, values: Array) -> Array:
     return share
 
 
-def shared_freedoms(
+def shared_terms(
     noise: Noise, shared: Mapping[str, Array], ripples: Array
-) -> tuple[Freedom, ...]:
-    """Freedoms of the effects (N, m) by what they are of, and the ripples (N, r)."""
+) -> tuple[RandomEffect, ...]:
+    """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
-    freedoms = [
-        Freedom(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
+    terms = [
+        RandomEffect(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
         for part, columns in shared.items()
     ]
     if ripples.shape[1]:
-        freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), Sizes()))
-    return tuple(f for f in freedoms if f.columns.shape[1])
+        terms.append(RandomEffect("ripples in both", ripples, whiten(noise, ripples), Sizes()))
+    return tuple(f for f in terms if f.columns.shape[1])
 
 
-def lasting(freedoms: Sequence[Freedom], sizes: Chosen) -> tuple[Freedom, ...]:
-    """The freedoms with what varies with time, heat, place or run no larger than its size in the
+def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
+    """The terms with what varies with time, heat, place or run no larger than its size in the
     reference. Where nothing dried, warmed up or crept then, it is news if something does now.
     """
     return tuple(
         replace(f, sizes=f.sizes.up_to(number)) if f.name == _name(CHANGES) else f
-        for f, number in zip(freedoms, sizes, strict=True)
+        for f, number in zip(terms, sizes, strict=True)
     )
 
 

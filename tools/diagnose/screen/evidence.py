@@ -144,9 +144,9 @@ def _varied(problem: Problem, gram: Gram, one: Weighed) -> list[Weighed]:
         each_size = gram.evidence + bayes
         best = int(np.argmax(each_size))
         amplitude = _amplitude(own[best], right[best])
-        told = float(np.sqrt(np.mean(amplitude[count:] ** 2)))
+        rms = float(np.sqrt(np.mean(amplitude[count:] ** 2)))
         amplitude = amplitude[:count]
-        amplitude[number] = np.copysign(max(abs(amplitude[number]), told), amplitude[number])
+        amplitude[number] = np.copysign(max(abs(amplitude[number]), rms), amplitude[number])
 
         total, exact = float(log_sum(each_size)), float(bayes[gram.exact])
         start = _start(effect, made, amplitude)

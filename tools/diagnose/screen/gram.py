@@ -31,7 +31,7 @@ from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.fit.random_effect import Freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.rig.interface import Bools, Index
 
 
@@ -59,7 +59,7 @@ class Gram:
 
     def __init__(self, problem: Problem, model: Model, rows: Bools | None = None) -> None:
         """rows: marks the values (N,) that count; if not given, all."""
-        forms, others = _freedoms(model)
+        forms, others = _terms(model)
         self._fixed = _fixed_columns(problem, model, others)
         self._form = np.column_stack(
             [np.zeros((problem.stack.size, 0)), *(f.whitened for f in forms)]
@@ -99,8 +99,8 @@ class Gram:
             for s in self.sizes
             if all(n <= m for n, m in zip(s.chosen, most, strict=True))
         ]
-        told = zip(self._forms, most, strict=True)
-        prior = sum(float(log_sum(f.sizes.log_prior[: m + 1])) for f, m in told)
+        pairs = zip(self._forms, most, strict=True)
+        prior = sum(float(log_sum(f.sizes.log_prior[: m + 1])) for f, m in pairs)
         return float(log_sum(small)) - prior
 
     @property
@@ -121,18 +121,18 @@ class Gram:
         return a, b
 
 
-def _freedoms(model: Model) -> tuple[Sequence[Freedom], Sequence[tuple[Freedom, float]]]:
+def _terms(model: Model) -> tuple[Sequence[RandomEffect], Sequence[tuple[RandomEffect, float]]]:
     """Of the model's form, and other forms of its effects with their sizes; none of a plain fit."""
     if model.marginal is None:
         return (), ()
-    every, first = model.marginal.freedoms, len(model.sizes)
-    bends = zip(every[first:], model.chosen[first:], strict=True)
-    sized = [(f, f.sizes.values[number]) for f, number in bends]
+    every, first = model.marginal.terms, len(model.sizes)
+    of_effects = zip(every[first:], model.chosen[first:], strict=True)
+    sized = [(f, f.sizes.values[number]) for f, number in of_effects]
     return every[:first], [(f, size) for f, size in sized if size > 0.0]
 
 
 def _fixed_columns(
-    problem: Problem, model: Model, others: Sequence[tuple[Freedom, float]]
+    problem: Problem, model: Model, others: Sequence[tuple[RandomEffect, float]]
 ) -> Array:
     """All but δ (N, q), each one standard deviation."""
     fitted = model.fitted
@@ -142,7 +142,7 @@ def _fixed_columns(
 
 
 def _sized(
-    gram: Array, score: Array, alone: float, forms: Sequence[Freedom], chosen: Chosen
+    gram: Array, score: Array, alone: float, forms: Sequence[RandomEffect], chosen: Chosen
 ) -> Sized:
     values = [f.sizes.values[n] for f, n in zip(forms, chosen, strict=True)]
     widths = [f.columns.shape[1] for f in forms]
@@ -160,7 +160,7 @@ def _sized(
     return Sized(chosen, prior + alone + 0.5 * float(y @ y) - spread, acting, size, root, y)
 
 
-def _about(model: Model, forms: Sequence[Freedom]) -> list[Chosen]:
+def _about(model: Model, forms: Sequence[RandomEffect]) -> list[Chosen]:
     """Sizes that are tried: those of the fit, each varied alone, all smaller and larger by
     steps.
     """

@@ -79,8 +79,8 @@ class OpenNoise:
         base = np.column_stack(
             (
                 fitted.raw / fitted.penalty[: len(centre)],
-                problem.allowance.columns,
-                fitted.allowance.carried,
+                problem.nuisance.columns,
+                fitted.nuisance.carried,
             )
         )
         y = stack.measured - fitted.predicted + fitted.raw @ centre

@@ -29,7 +29,7 @@ from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_sum
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.fit.random_effect import Freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import some_of
 from gritd.tools.diagnose.noise.colour import whiten
@@ -51,7 +51,7 @@ class Screening:
 
     problem: Problem
     base: Model
-    forms: tuple[Freedom, ...]
+    forms: tuple[RandomEffect, ...]
     functions: tuple[Signature, ...]
     families: tuple[Family, ...]
 
@@ -249,8 +249,8 @@ def strain_of(problem: Problem, model: Model) -> tuple[float, str]:
     beside a reference, of those that tell what is new.
     """
     constants, referred = problem.stack.rig.constants, problem.stack.referred
-    told = zip(constants, np.abs(model.fitted.u).tolist(), strict=True)
-    each = [(u, c.name) for c, u in told if c.changes or not referred]
+    pairs = zip(constants, np.abs(model.fitted.u).tolist(), strict=True)
+    each = [(u, c.name) for c, u in pairs if c.changes or not referred]
     return max(each, default=(0.0, ""))
 
 

@@ -55,8 +55,8 @@ def unnamed_in_both(
     least = -float(np.log(TUNING.screen.level))
 
     projection = model.fitted.projection()
-    told = _gains(problem, projection.of_rows(~new), every, (~new,))
-    smooth = [s for s, gain in zip(every, told, strict=True) if gain > least]
+    known = _gains(problem, projection.of_rows(~new), every, (~new,))
+    smooth = [s for s, gain in zip(every, known, strict=True) if gain > least]
 
     beside = without_harmonics(problem, model.fitted)
     alone = beside.of_rows(~new)

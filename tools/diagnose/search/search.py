@@ -147,7 +147,7 @@ def _settled(search: EffectSearch) -> EffectSearch:
 
 
 @dataclass(frozen=True)
-class Promise:
+class Predicted:
     """An effect beside a model: its log evidence by linear algebra, of the model with it [nats],
     and where its fit begins.
     """
@@ -180,25 +180,25 @@ def extended(
     tell: is given how many of how many fits are done; of none before their number is known.
     """
     tell(0, 0)
-    every = [p for model in starts for p in _promises(search, model, jobs)]
-    wanted: dict[frozenset[str], Promise] = {}
-    for promise in sorted(every, key=lambda p: -p.evidence):
-        if len(wanted) < most and not search.has(promise.names):
-            wanted.setdefault(promise.names, promise)
+    every = [p for model in starts for p in _gains(search, model, jobs)]
+    wanted: dict[frozenset[str], Predicted] = {}
+    for predicted in sorted(every, key=lambda p: -p.evidence):
+        if len(wanted) < most and not search.has(predicted.names):
+            wanted.setdefault(predicted.names, predicted)
 
-    def fitted(promise: Promise) -> Model | None:
+    def fitted(predicted: Predicted) -> Model | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return attempted(lambda: _with_effect(search, promise))
+            return attempted(lambda: _with_effect(search, predicted))
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
-    told = zip(wanted.values(), made, strict=True)
-    failed = tuple((*p.model.names, p.effect) for p, model in told if model is None)
+    pairs = zip(wanted.values(), made, strict=True)
+    failed = tuple((*p.model.names, p.effect) for p, model in pairs if model is None)
     models = (*search.models, *(model for model in made if model is not None))
     return replace(search, models=models, failed=(*search.failed, *failed))
 
 
-def _promises(search: EffectSearch, model: Model, jobs: int) -> list[Promise]:
+def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
     """Effects that gain enough beside a model: a share of the best, which a fit may turn round."""
     first = search.first.effects
     if model is search.bare:
@@ -212,10 +212,10 @@ def _promises(search: EffectSearch, model: Model, jobs: int) -> list[Promise]:
         names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
     top = max((beside.gain(name) for name in names), default=0.0)
     alone = TUNING.search.little if model.names else TUNING.search.promising
-    least = max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
+    least = max(alone, TUNING.search.predicted_share * top - TUNING.search.predicted_less)
     likely = [name for name in names if beside.gain(name) > least]
     return [
-        Promise(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
+        Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
         for n in likely
     ]
 
@@ -254,39 +254,39 @@ def counting(step: Callable[[str], None], what: str) -> Callable[[int, int], Non
 
 
 def shared(search: EffectSearch) -> list[object]:
-    """What fits of a search hold: its freedoms and its models."""
-    allowed = (freedom for freedom, _ in search.problem.allowance.parts)
+    """What fits of a search hold: its terms and its models."""
+    allowed = (term for term, _ in search.problem.nuisance.parts)
     return [*allowed, *search.screening.forms, *search.models]
 
 
-def _with_effect(search: EffectSearch, promise: Promise) -> Model:
+def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
     """The model with one more effect, the best of its starts. Where it ends well below the model
     that it holds, it is at a poor local optimum: it is fitted again from there, with the effect's
     strengths at nought.
     """
-    model, effect = promise.model, search.problem.stack.rig.effects[promise.effect]
-    begins = [(one.start, one.sizes) for one in promise.starts]
-    made = max((_fitted_with(search, promise, *b) for b in begins), key=lambda m: m.evidence)
+    model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
+    begins = [(one.start, one.sizes) for one in predicted.starts]
+    made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
     if made.evidence > model.evidence - TUNING.search.little:
         return made
 
     strengths = [p.role == "strength" for p in effect.parameters()]
-    none = np.where(strengths, 0.0, promise.starts[0].start)
-    again = _fitted_with(search, promise, none, model.sizes)
+    none = np.where(strengths, 0.0, predicted.starts[0].start)
+    again = _fitted_with(search, predicted, none, model.sizes)
     return max(made, again, key=lambda m: m.evidence)
 
 
 def _fitted_with(
-    search: EffectSearch, promise: Promise, start: Array, sizes: tuple[int, ...]
+    search: EffectSearch, predicted: Predicted, start: Array, sizes: tuple[int, ...]
 ) -> Model:
     """start (p,) of the effect's parameters; sizes: of the forms."""
-    fitted, screening = promise.model.fitted, search.screening
-    effect = search.problem.stack.rig.effects[promise.effect]
+    fitted, screening = predicted.model.fitted, search.screening
+    effect = search.problem.stack.rig.effects[predicted.effect]
     effects: tuple[Maker, ...] = (*fitted.effects, effect)
-    free = (*fitted.free, *_free_near(search.problem.stack.rig, promise.effect, start))
+    free = (*fitted.free, *_free_near(search.problem.stack.rig, predicted.effect, start))
     begins = (fitted.u, np.concatenate((fitted.x, start)))
-    forms, bends = screening.forms, promise.model.other_forms
-    return fit_model(screening.problem, forms, effects, free, begins, sizes, bends, fitted)
+    forms, errors = screening.forms, predicted.model.other_forms
+    return fit_model(screening.problem, forms, effects, free, begins, sizes, errors, fitted)
 
 
 def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
@@ -349,8 +349,8 @@ def _less(search: EffectSearch, model: Model, name: str) -> Model:
     still = [f.name != name for f in fitted.free]
     free = tuple(f for f, stays in zip(fitted.free, still, strict=True) if stays)
     begins = (fitted.u, fitted.x[np.array(still, bool)])
-    screening, bends = search.screening, model.other_forms.of(kept)
+    screening, errors = search.screening, model.other_forms.of(kept)
     with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
         return fit_model(
-            screening.problem, screening.forms, types, free, begins, model.sizes, bends, fitted
+            screening.problem, screening.forms, types, free, begins, model.sizes, errors, fitted
         )

@@ -37,7 +37,7 @@ class Explain:
 
     # --- reconciled.py ---
     stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off", "judgement")
-    told_freedom: float = tuned(
+    precision_freedom: float = tuned(
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
     )
     summed_steps: int = tuned(801, "points", "about each of the two", "run time")

@@ -1,4 +1,4 @@
-"""Tuned numbers of tools/diagnose/fit: the fit, its freedoms, and evidence about it."""
+"""Tuned numbers of tools/diagnose/fit: the fit, its random effects, and evidence about it."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class FitTuning:
     damping_most: float = tuned(1e7, "-", "of the curvature: a descent that needs more has ended")
     damping_harder: float = tuned(8.0, "-", "factor on the damping after a step that failed")
     damping_softer: float = tuned(0.2, "-", "factor on the damping after a good step")
-    fulfilled: float = tuned(0.1, "-", "of the gain foretold: a step is taken")
-    good: float = tuned(0.75, "share", "of the gain foretold: the damping falls")
+    fulfilled: float = tuned(0.1, "-", "of the expected gain: a step is taken")
+    good: float = tuned(0.75, "share", "of the expected gain: the damping falls")
     at_bound: float = tuned(1e-9, "-", "closer to a bound a coordinate is on it", "rounding")
     held_sets: int = tuned(8, "times", "the set of held coordinates may grow within one step")
 
@@ -117,23 +117,23 @@ class FitTuning:
     waves: int = tuned(4, "cosines", "along time or place")
     varies: float = tuned(1e-3, "-", "relative spread below which a covariate does not vary")
     outlying: float = tuned(4.0, "σ", "a standardised covariate is cut beyond it")
-    bends: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
+    cosines: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
     turn_orders: tuple[float, ...] = tuned(
         (1.0, 2.0), "choice", "ripples a turn that no smooth term takes; higher: listed effects"
     )
 
     # --- heldout.py ---
-    folds: int = tuned(3, "parts", "of which each is foretold by the others, where runs are fewer")
+    folds: int = tuned(3, "parts", "of which each is predicted by the others, where runs are fewer")
     bands: int = tuned(3, "bands", "of slip and of load that are held out")
     band_spread: float = tuned(0.05, "-", "relative spread below which there are no bands")
 
     # --- marginal.py, model.py ---
     slight_size: float = tuned(1e-3, "-", "weight of sizes below which they do not count")
-    size_sweeps: int = tuned(4, "sweeps", "over the freedoms, each to its likeliest size")
+    size_sweeps: int = tuned(4, "sweeps", "over the random effects, each to its likeliest size")
     size_rounds: int = tuned(
         5, "rounds", "of fit and sizes in turn", "nearly always two are enough"
     )
-    bent_anew: int = tuned(2, "rounds", "in which other forms are made anew where the fit stands")
+    form_rounds: int = tuned(2, "rounds", "in which other forms are made anew where the fit stands")
     last_step: float = tuned(0.3, "nats", "that the evidence may count beyond where a fit stands")
 
     # --- problem.py ---

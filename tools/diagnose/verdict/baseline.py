@@ -8,7 +8,7 @@ is first searched as any campaign is, and the effects found act in both campaign
 that both tell.
 
 An effect that goes with time, heat, place or run may be another one a day later, but for one that
-begins anew in every run, and a ripple has another phase in each run: those stay with the freedoms
+begins anew in every run, and a ripple has another phase in each run: those stay with the terms
 of fit/shared.py.
 """
 

@@ -28,7 +28,7 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
 from gritd.tools.diagnose.verdict.resemblance import trusted
-from gritd.tools.diagnose.verdict.unexplained import Nameless, unexplained_with
+from gritd.tools.diagnose.verdict.unexplained import UnexplainedTerms, unexplained_with
 
 
 def decide(
@@ -59,10 +59,10 @@ def _beside(
     models: Sequence[Model],
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
-) -> dict[Model, Nameless | None]:
+) -> dict[Model, UnexplainedTerms | None]:
     """What has no name beside each of some models. tell: is given how many of how many are done."""
 
-    def nameless(model: Model) -> Nameless | None:
+    def nameless(model: Model) -> UnexplainedTerms | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return _with_unexplained(search, model)
 
@@ -78,7 +78,7 @@ def _rivals(search: EffectSearch, best: Model) -> list[Model]:
 
 
 def weigh(
-    search: EffectSearch, beside: Mapping[Model, Nameless | None]
+    search: EffectSearch, beside: Mapping[Model, UnexplainedTerms | None]
 ) -> list[WeighedExplanation]:
     """All explanations with their evidence [nats above the bare model].
 
@@ -96,7 +96,7 @@ def weigh(
 def judged(
     search: EffectSearch,
     weighed: Sequence[WeighedExplanation],
-    beside: Mapping[Model, Nameless | None],
+    beside: Mapping[Model, UnexplainedTerms | None],
     calibration: OddsCalibration,
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
@@ -116,35 +116,35 @@ def judged(
     trust = _trust(every, best)
     least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
     kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
-    told, share = _told(search, best, kept)
-    whole = beside[told] if told in beside else _with_unexplained(search, told)
-    foretold = not told.names or _foretold(search, whole.model if whole is not None else told)
-    if not foretold:
-        told, share, whole = search.bare, 0.0, beside.get(search.bare)
+    named, share = _named(search, best, kept)
+    whole = beside[named] if named in beside else _with_unexplained(search, named)
+    predicts = not named.names or _predicts(search, whole.model if whole is not None else named)
+    if not predicts:
+        named, share, whole = search.bare, 0.0, beside.get(search.bare)
 
     return Decision(
-        "explained" if told.names else "unlisted",
-        told,
+        "explained" if named.names else "unlisted",
+        named,
         share,
         whole,
         probability,
         unlisted,
-        _groups(every, told if told.names else best.model),
+        _groups(every, named if named.names else best.model),
         every,
         tuple(
-            Resembled(name, best.share, best.model.form_share(name), foretold or name not in kept)
+            Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
             for name in best.names
-            if name not in told.names
+            if name not in named.names
             and best.share * _weight(every, best) > TUNING.verdict.resembles
         ),
     )
 
 
-def _with_unexplained(search: EffectSearch, model: Model) -> Nameless | None:
+def _with_unexplained(search: EffectSearch, model: Model) -> UnexplainedTerms | None:
     return attempted(lambda: unexplained_with(search.screening, model))
 
 
-def _foretold(search: EffectSearch, whole: Model) -> bool:
+def _predicts(search: EffectSearch, whole: Model) -> bool:
     """Whether a model misses less than the equations alone of runs that were held out."""
     return missed(search.problem, whole.fitted) < missed(search.problem, search.base.fitted)
 
@@ -160,7 +160,7 @@ def trusting(
     return made
 
 
-def _told(
+def _named(
     search: EffectSearch, best: WeighedExplanation, kept: Sequence[str]
 ) -> tuple[Model, float]:
     """The model of the names that are accepted, and the share that they take."""

@@ -7,7 +7,7 @@ from math import prod
 from typing import Literal
 
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.verdict.unexplained import Nameless
+from gritd.tools.diagnose.verdict.unexplained import UnexplainedTerms
 
 Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 
@@ -70,7 +70,7 @@ class Decision:
     verdict: Verdict
     best: Model
     share: float  # of the misfit that the best model's effects take, by squares
-    beside: Nameless | None
+    beside: UnexplainedTerms | None
     probability: dict[str, float]
     unlisted: float
     groups: dict[str, tuple[str, ...]]

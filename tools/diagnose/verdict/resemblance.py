@@ -51,10 +51,10 @@ def _of_share(share: float, power: float) -> float:
 def _likelihood(rig: Rig, model: Model, name: str) -> Array:
     """Of each size of the form error (h,), the largest 1; alike where h says nothing."""
     effect = next(one for one in model.fitted.acting if one.name == name)
-    told = None if _has_line(rig, effect) else model.of_forms(name)
-    if told is None:
+    likelihood = None if _has_line(rig, effect) else model.of_forms(name)
+    if likelihood is None:
         return np.ones(len(TUNING.fit.form_error_sizes))
-    return np.asarray(np.exp(told - told.max()))
+    return np.asarray(np.exp(likelihood - likelihood.max()))
 
 
 def _has_line(rig: Rig, effect: Effect) -> bool:

@@ -20,7 +20,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
-class Nameless:
+class UnexplainedTerms:
     """Functions beside a model, fitted with everything else; gain: log evidence above the model's,
     the number of functions that were tried counted.
     """
@@ -30,7 +30,7 @@ class Nameless:
     gain: float
 
 
-def unexplained_with(screening: Screening, model: Model) -> Nameless | None:
+def unexplained_with(screening: Screening, model: Model) -> UnexplainedTerms | None:
     """The functions that act together beside a model; None where none pays for itself."""
     chosen, price = _chosen(screening, model)
     if not chosen:
@@ -38,7 +38,7 @@ def unexplained_with(screening: Screening, model: Model) -> Nameless | None:
     fitted = [_fitted(screening, model, chosen, size) for size in TUNING.verdict.function_sizes]
     best = max(fitted, key=lambda m: m.evidence)
     gain = best.evidence - model.evidence + price
-    return Nameless(best, tuple(chosen), gain) if gain > 0.0 else None
+    return UnexplainedTerms(best, tuple(chosen), gain) if gain > 0.0 else None
 
 
 def unexplained_functions(screening: Screening, model: Model) -> list[Signature]:

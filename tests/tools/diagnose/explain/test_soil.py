@@ -16,7 +16,7 @@ from gritd.tools.diagnose.explain import learnt
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.diagnose.explain.soil import _beside_prior, _quantity, _soil_of
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.discrepancy import form_terms
 from gritd.tools.diagnose.fit.model import Model, sized_model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.method import fit_base
@@ -74,7 +74,7 @@ def _fitted() -> tuple[Problem, Model]:
     runs = record(plan(seconds=24.0), (make("bulldozing", {"share": 1.0}),))
     rig = wheel_rig(runs, settings()).having((shown,))
     base = fit_base(rig)
-    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    forms = form_terms(base.problem.stack, base.problem.noise)
     none = tuple(0 for _ in forms)
     return base.problem, sized_model(base.problem, forms, (base.fitted.u, np.zeros(0)), none)
 

@@ -68,9 +68,9 @@ class _Bend:
 
     bounds = CoordinateBounds(np.full(2, -20.0), np.full(2, 20.0))
 
-    def __init__(self, told: bool, steep: float = 10.0) -> None:
-        """told: whether the descent knows along which unknown the valley is curved."""
-        self.curved = np.array([False, told])
+    def __init__(self, shown: bool, steep: float = 10.0) -> None:
+        """shown: whether the descent knows along which unknown the valley is curved."""
+        self.curved = np.array([False, shown])
         self.steep = steep
         self.linearisations = 0
 
@@ -96,8 +96,8 @@ class _Bend:
         return _Place(centre, self.tried(centre)[1], gradient, slopes.T @ slopes)
 
 
-def _rounds(told: bool, start: float) -> int:
-    bend = _Bend(told)
+def _rounds(shown: bool, start: float) -> int:
+    bend = _Bend(shown)
     reached, converged = descend(bend, bend.linearised(np.array([start**2, start])), 300)
     assert converged and reached.nats < 0.01
     return bend.linearisations

@@ -13,7 +13,7 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
-from gritd.tools.diagnose.fit.form_error import _following, form_errors, had_freedoms
+from gritd.tools.diagnose.fit.form_error import _following, baseline_terms, form_errors
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.stack import Stack
@@ -65,12 +65,12 @@ def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     fitted = problem.descend(
         (effect,), free, np.zeros(len(stack.rig.constants)), np.ones(len(free)), rounds=0
     )
-    *_, freedom = form_errors(stack, problem.noise, fitted)
+    *_, term = form_errors(stack, problem.noise, fitted)
 
     plain = stack.predict(np.zeros(len(stack.rig.constants)), ())
     added = fitted.predicted - plain
     building = added * np.exp(-_rolled(stack) / 1.0)
-    every = np.column_stack((freedom.columns, fitted.raw[:, len(fitted.u) :]))
+    every = np.column_stack((term.columns, fitted.raw[:, len(fitted.u) :]))
     left = building - every @ np.linalg.lstsq(every, building, rcond=None)[0]
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(building)) == follows
 
@@ -95,7 +95,7 @@ def test_every_run_and_channel_begins_anew() -> None:
 
 
 def _drifting(zero: np.ndarray) -> float:
-    """Share of a drift (N,) of the drawbar pull's zero that is outside the freedom of
+    """Share of a drift (N,) of the drawbar pull's zero that is outside the term of
     `sensor_drift`.
     """
     problem = _problem()
@@ -105,8 +105,8 @@ def _drifting(zero: np.ndarray) -> float:
     none = np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, none, start, rounds=0)
 
-    freedoms = form_errors(stack, problem.noise, fitted)
-    every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(none) :]])
+    terms = form_errors(stack, problem.noise, fitted)
+    every = np.column_stack([*(f.columns for f in terms), fitted.raw[:, len(none) :]])
     drift = np.where(stack.of("drawbar_pull"), zero, 0.0)
     left = drift - every @ np.linalg.lstsq(every, drift, rcond=None)[0]
     return float(np.linalg.norm(left) / np.linalg.norm(drift))
@@ -154,11 +154,11 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
-    *_, freedom = form_errors(stack, problem.noise, fitted)
+    *_, term = form_errors(stack, problem.noise, fitted)
 
     names = [constant.name for constant in stack.rig.constants]
     slipping = fitted.raw[:, names.index(stack.rig.slipping)]
-    every = np.column_stack((freedom.columns, fitted.raw[:, len(fitted.u) :]))
+    every = np.column_stack((term.columns, fitted.raw[:, len(fitted.u) :]))
     left = slipping - every @ np.linalg.lstsq(every, slipping, rcond=None)[0]
     taken = np.linalg.norm(left) < 1e-6 * np.linalg.norm(slipping)
     assert taken == slips
@@ -170,20 +170,20 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
 )
 def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool) -> None:
     """An effect that is three tenths stronger and weaker along the bed, ten times on it, is within
-    its freedom to vary along the place; a friction of the drive is not.
+    its term to vary along the place; a friction of the drive is not.
     """
     problem = _problem()
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
-    freedoms = form_errors(stack, problem.noise, fitted)
-    assert len(freedoms) == (2 if placed else 1)
+    terms = form_errors(stack, problem.noise, fitted)
+    assert len(terms) == (2 if placed else 1)
 
     place = stack.covariate("position")
     along = (place - place.min()) / np.ptp(place)
     added = fitted.predicted - stack.predict(still, ())
     wavy = 0.3 * added * np.cos(20.0 * np.pi * along)
-    every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(still) :]])
+    every = np.column_stack([*(f.columns for f in terms), fitted.raw[:, len(still) :]])
     left = wavy - every @ np.linalg.lstsq(every, wavy, rcond=None)[0]
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(wavy)) == placed
 
@@ -233,8 +233,8 @@ def test_a_steady_effect_has_no_profile() -> None:
     stack, free = problem.stack, free_of((EFFECTS["bulldozing"],))
     start = np.zeros(len(stack.rig.constants)), np.ones(len(free))
     fitted = problem.descend((EFFECTS["bulldozing"],), free, *start, rounds=0)
-    freedoms = form_errors(stack, problem.noise, fitted)
-    assert all(f.sizes.values[-1] < 2.0 for f in freedoms)
+    terms = form_errors(stack, problem.noise, fitted)
+    assert all(f.sizes.values[-1] < 2.0 for f in terms)
 
 
 def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_new() -> None:
@@ -251,7 +251,7 @@ def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_n
     np.testing.assert_allclose(as_had.predicted, as_new.predicted, rtol=1e-6, atol=1e-6)
 
     ours = form_errors(plain.stack, plain.noise, as_new)
-    theirs = had_freedoms(had.stack, had.noise, as_had)
+    theirs = baseline_terms(had.stack, had.noise, as_had)
     assert [f.name for f in theirs] == [f.name for f in ours]
     for one, other in zip(ours, theirs, strict=True):
         assert one.sizes == other.sizes and one.least == other.least
@@ -263,4 +263,4 @@ def test_a_rig_without_a_reference_has_none_of_it() -> None:
     problem = _problem()
     none = np.zeros(len(problem.stack.rig.constants))
     fitted = problem.descend((), (), none, np.zeros(0), rounds=0)
-    assert had_freedoms(problem.stack, problem.noise, fitted) == ()
+    assert baseline_terms(problem.stack, problem.noise, fitted) == ()

@@ -1,4 +1,4 @@
-"""The evidence for all sizes of a freedom at once is that of each size by itself."""
+"""The evidence for all sizes of a term at once is that of each size by itself."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.marginal import Marginal
-from gritd.tools.diagnose.fit.nuisance import Allowance
+from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes
 
 N = 40
 SIZES = Sizes((0.0, 0.3, 1.0, 4.0), (0.1, 0.2, 0.3, 0.4))
 
 
 def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
-    """One constant, some strengths, two columns of tolerance and two freedoms."""
+    """One constant, some strengths, two columns of tolerance and two terms."""
     rng = np.random.default_rng(seed)
     effects = (EFFECTS["viscous_friction"],)[:strengths]
     free = free_of(effects)
     jacobian, tolerance = rng.standard_normal((N, 1 + len(free))), rng.standard_normal((N, 2))
     columns = [rng.standard_normal((N, m)) for m in (3, 5)]
-    freedoms = [Freedom(str(c.shape), c, c, SIZES) for c in columns]
-    fixed = Freedom("tolerance", tolerance, tolerance, Sizes())
+    terms = [RandomEffect(str(c.shape), c, c, SIZES) for c in columns]
+    fixed = RandomEffect("tolerance", tolerance, tolerance, Sizes())
     residual, at = rng.standard_normal(N) * 2.0, rng.standard_normal(1 + len(free))
     fitted = Fitted(
         effects,
@@ -41,13 +41,13 @@ def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
         np.ones(jacobian.shape[1] + 2),
         np.zeros(2),
         0.0,
-        Allowance(((fixed, 1.0),)),
+        NuisanceColumns(((fixed, 1.0),)),
         fixed.whitened.T @ jacobian,
         np.zeros(jacobian.shape[1]),
         np.eye(jacobian.shape[1]),
         np.zeros(jacobian.shape[1], bool),
     )
-    return Marginal(fitted, (fixed,), freedoms), (jacobian, tolerance, columns, residual, at)
+    return Marginal(fitted, (fixed,), terms), (jacobian, tolerance, columns, residual, at)
 
 
 @pytest.mark.parametrize("strengths", [0, 1])
@@ -81,7 +81,7 @@ def test_the_soil_is_told_with_no_channel_exact_beside_one_missed_by_much() -> N
     loose, _ = _marginal(0)
     sizes = Sizes((0.0, 0.003, 0.01, 0.03, 0.1, 0.3), (1.0,) * 6)
     for one, of_form in ((marginal, True), (loose, False)):
-        one.freedoms = tuple(replace(f, sizes=sizes, of_form=of_form) for f in one.freedoms)
+        one.terms = tuple(replace(f, sizes=sizes, of_form=of_form) for f in one.terms)
 
     chosen = (5, 0)
     assert marginal._least(chosen) == (3, 3)

@@ -1,4 +1,4 @@
-"""A model's fit: where it begins, and with which freedoms it stands."""
+"""A model's fit: where it begins, and with which terms it stands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from gritd.estimator.effects import EFFECTS, make
 from gritd.tools.diagnose.fit.base import BaseFit
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.discrepancy import form_terms
 from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
@@ -54,7 +54,7 @@ def test_a_fit_stands_where_its_evidence_is_told() -> None:
     acting = (make("slip_sinkage", {"growth": 0.4}),)
     rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig)
-    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    forms = form_terms(base.problem.stack, base.problem.noise)
 
     effects = (EFFECTS["sinkage_gain"],)
     begins, sizes = (base.fitted.u, np.array([1.0])), tuple(3 for _ in forms)
@@ -62,9 +62,9 @@ def test_a_fit_stands_where_its_evidence_is_told() -> None:
 
     mean, _ = model.constants()
     of_soil = np.array([c.soil for c in rig.constants])
-    assert model.bends[-1] > 0.0
+    assert model.form_sizes[-1] > 0.0
     assert np.abs(mean - model.fitted.u)[of_soil].max() < 1.0
-    assert model.evidence > -1200.0  # -1250 without its freedoms
+    assert model.evidence > -1200.0  # -1250 without its terms
 
 
 def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() -> None:
@@ -75,7 +75,7 @@ def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() ->
     acting = (make("side_slip", {"angle": 0.3}),)
     rig = wheel_rig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig)
-    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    forms = form_terms(base.problem.stack, base.problem.noise)
 
     begins, sizes = (base.fitted.u, np.array([0.5, 0.0, 2.0])), tuple(0 for _ in forms)
     model = fit_model(base.problem, forms, both, free_of(both), begins, sizes)
@@ -88,7 +88,7 @@ def test_the_evidence_counts_no_more_than_the_fit_reached(rounds: int) -> None:
     """What the slopes promise beyond where it stands is not counted; nothing, at an optimum."""
     base = shifted()
     begins, free = (base.fitted.u, np.array([-1.0, 0.0])), free_of((PEAK,))
-    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    forms = form_terms(base.problem.stack, base.problem.noise)
     sizes = tuple(0 for _ in forms)
 
     with replaced("fit", rounds=rounds, size_rounds=1):

@@ -40,7 +40,7 @@ def test_columns_are_judged_beside_a_discrepancy_of_each_size(which: int) -> Non
 
     assert bare.marginal is not None
     fitted, chosen = bare.fitted, gram.sizes[which].chosen
-    sized = zip(bare.marginal.freedoms, chosen, strict=True)
+    sized = zip(bare.marginal.terms, chosen, strict=True)
     forms = [f.sizes.values[number] * f.whitened for f, number in sized]
     own = fitted.own / fitted.penalty[: fitted.centre.size]
     jacobian = np.column_stack((own, *(f.whitened for f in problem.fixed), *forms))

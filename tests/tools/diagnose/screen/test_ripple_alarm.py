@@ -22,8 +22,8 @@ def test_a_ripple_at_full_rate_is_an_alarm_by_itself() -> None:
 
 @pytest.mark.parametrize(("strain", "alarms"), [(3.4, False), (4.5, True)])
 def test_beyond_four_sigma_nothing_is_consistent(strain: float, alarms: bool) -> None:
-    told = replace(QUIET, strain=strain)
-    assert told.alarmed == alarms and (told.p < 0.01) == alarms
+    shown = replace(QUIET, strain=strain)
+    assert shown.alarmed == alarms and (shown.p < 0.01) == alarms
 
 
 @pytest.mark.parametrize(("evidence", "alarms"), [(4.0, False), (8.0, True)])

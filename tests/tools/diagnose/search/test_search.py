@@ -23,9 +23,9 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search import search as searching
 from gritd.tools.diagnose.search.search import (
     EffectSearch,
-    Promise,
+    Predicted,
     _free_near,
-    _promises,
+    _gains,
     _retested,
     _with_effect,
     begin,
@@ -44,10 +44,10 @@ def searched(acting: Effect | None, **given: Any) -> EffectSearch:
     return begin(prepare_screening(fit_base(rig)))
 
 
-def offered(model: Model, name: str, start: list[float], sizes: tuple[int, ...] = ()) -> Promise:
+def offered(model: Model, name: str, start: list[float], sizes: tuple[int, ...] = ()) -> Predicted:
     """An effect whose fit begins at parameters in expected sizes."""
     made = Signature(name, np.zeros((0, 0)), (), {})
-    return Promise(model, 9.0, (Weighed(made, 9.0, 9.0, np.array(start), sizes),))
+    return Predicted(model, 9.0, (Weighed(made, 9.0, 9.0, np.array(start), sizes),))
 
 
 def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
@@ -71,7 +71,7 @@ def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> N
 
     rippling = replace(quiet, first=replace(quiet.first, ripple=1e-9))
     assert rippling.first.alarmed
-    tried = {promise.effect for promise in _promises(rippling, rippling.bare, 1)}
+    tried = {predicted.effect for predicted in _gains(rippling, rippling.bare, 1)}
     assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}
 
 
@@ -81,14 +81,14 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     every = [offered(bare, name, [0.0]) for name in ("coulomb_friction", "bulldozing")]
     monkeypatch.setattr(searching, "_promises", lambda *_: every)
 
-    def fitted(_: EffectSearch, promise: Promise) -> Model:
-        if promise.effect == "bulldozing":
+    def fitted(_: EffectSearch, predicted: Predicted) -> Model:
+        if predicted.effect == "bulldozing":
             raise np.linalg.LinAlgError("Eigenvalues did not converge")
-        return replace(promise.model, names=(promise.effect,))
+        return replace(predicted.model, names=(predicted.effect,))
 
     monkeypatch.setattr(searching, "_with_effect", fitted)
     rig = SimpleNamespace(aside=nullcontext, effects=dict.fromkeys(EFFECTS))
-    problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), allowance=SimpleNamespace(parts=()))
+    problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), nuisance=SimpleNamespace(parts=()))
     screening: Any = SimpleNamespace(problem=problem, forms=())
     search = EffectSearch(screening, (bare, bare), cast(Any, None))
 
@@ -145,8 +145,8 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
     varied = varied_pass(search.problem, search.bare, first)
     assert varied.gain("side_wall_rubbing") > first.gain("side_wall_rubbing") + 50.0
 
-    promise = next(p for p in _promises(search, search.bare, 1) if p.effect == "side_wall_rubbing")
-    fitted = _with_effect(search, promise)
+    predicted = next(p for p in _gains(search, search.bare, 1) if p.effect == "side_wall_rubbing")
+    fitted = _with_effect(search, predicted)
     assert fitted.fitted.acting[0].share == pytest.approx(0.05, rel=0.25)  # type: ignore[attr-defined]
     assert fitted.evidence > search.bare.evidence + 50.0
 
@@ -154,9 +154,9 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
 def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     patch = make("soil_patch", {"friction_change": -0.2, "centre": 0.2, "length": 0.2})
     search = searched(patch)
-    promise = next(p for p in _promises(search, search.bare, 1) if p.effect == "soil_patch")
-    assert 1 < len(promise.starts) <= TUNING.search.elsewhere
-    assert len({tuple(one.start) for one in promise.starts}) == len(promise.starts)
-    best = _with_effect(search, promise).evidence
-    alone = [_with_effect(search, replace(promise, starts=(one,))) for one in promise.starts]
+    predicted = next(p for p in _gains(search, search.bare, 1) if p.effect == "soil_patch")
+    assert 1 < len(predicted.starts) <= TUNING.search.elsewhere
+    assert len({tuple(one.start) for one in predicted.starts}) == len(predicted.starts)
+    best = _with_effect(search, predicted).evidence
+    alone = [_with_effect(search, replace(predicted, starts=(one,))) for one in predicted.starts]
     assert best >= max(model.evidence for model in alone) - 1e-6

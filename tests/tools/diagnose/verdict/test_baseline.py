@@ -59,8 +59,8 @@ def test_it_acts_in_both_and_its_parameters_are_constants() -> None:
     longer = own.copy()
     longer[having.constants.index(having.constants[-1])] = 1.0
     other = replace(LAG, length=0.08)
-    told = Stack(plain).predict(known, (other,), everywhere=True)
-    np.testing.assert_allclose(Stack(having).predict(longer), told)
+    shown = Stack(plain).predict(known, (other,), everywhere=True)
+    np.testing.assert_allclose(Stack(having).predict(longer), shown)
 
 
 def test_more_of_it_may_be_new_and_the_configuration_does_not_hold_it() -> None:

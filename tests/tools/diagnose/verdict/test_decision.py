@@ -20,9 +20,9 @@ from gritd.tools.diagnose.fit.evidence import strength_sizes
 from gritd.tools.diagnose.fit.form_error import form_error_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.nuisance import Allowance
+from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.search.calibration import learnt
@@ -49,7 +49,7 @@ def test_another_published_form_keeps_its_name() -> None:
     """
     ours = _model((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
     other = _model((HessSoomFriction(size=1.5),), "stribeck_friction")
-    assert ours.bends == (form_error_sizes().values[0],) < other.bends
+    assert ours.form_sizes == (form_error_sizes().values[0],) < other.form_sizes
     assert other.marginal is not None
     assert other.evidence > other.marginal.log_evidence((0,)) + 3.0
 
@@ -165,7 +165,7 @@ def test_of_equals_the_simplest_comes_first(names_alone: None) -> None:
 def test_a_form_error_that_no_published_law_needs_tells_against_a_name() -> None:
     """As much likelihood without bending and with it says little; bending that pays says much."""
     straight, open_, bent = np.exp([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])
-    believed = [resemblance.believed(told, 0.9, 0.13) for told in (straight, open_, bent)]
+    believed = [resemblance.believed(shown, 0.9, 0.13) for shown in (straight, open_, bent)]
     assert believed[0] > 0.97 > believed[1] > 0.5 and believed[2] < 0.5
     assert resemblance.believed(straight, 0.05, 0.13) < believed[0]
 
@@ -263,7 +263,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     residual = values - jacobian @ at
     objective = float(residual @ residual + np.sum((penalty * at) ** 2))
     none = np.zeros((30, 0))
-    fixed = Freedom("nothing", none, none, Sizes())
+    fixed = RandomEffect("nothing", none, none, Sizes())
     fitted = Fitted(
         (effect,),
         free,
@@ -276,7 +276,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
         penalty,
         np.zeros(0),
         objective,
-        Allowance(((fixed, 1.0),)),
+        NuisanceColumns(((fixed, 1.0),)),
         np.zeros((0, 2)),
         np.zeros(2),
         np.eye(2),

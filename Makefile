@@ -42,7 +42,7 @@ long: $(READY) ## whole campaigns, benches, worlds and faults: what decides a ve
 tutorial: $(READY) ## the pages and notebooks of docs/first-day and docs/your-data, word for word
 	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs
 
-slow: $(READY) ## the slow tests
+slow: $(READY) ## what takes minutes each, or needs a scheduler or public recordings
 	@$(BIN)/python -m pytest --quiet -m slow
 
 package: $(READY) ## the wheel, installed beside foreign packages of our folders' names

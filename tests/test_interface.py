@@ -115,7 +115,7 @@ def test_arrays_that_do_not_fit_are_told_in_a_line(arrays, words):
         gritd.Filter(packaged()).run(arrays)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_diagnosis_draws_itself_in_a_notebook(tmp_path):
     runs = [
         gritd.simulate(

@@ -196,7 +196,7 @@ def shout(multicast, datagrams):
                 time.sleep(0.005)
 
 
-@pytest.mark.parametrize("count", [3000, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [3000, pytest.param(100_000, marks=pytest.mark.long)])
 def test_hostile_datagrams_are_counted_and_ignored(multicast, count):
     shout(multicast, hostile_datagrams(random.Random(6), count))
 

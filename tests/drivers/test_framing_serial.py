@@ -120,7 +120,7 @@ def test_a_fault_costs_the_frames_it_touches_and_at_most_one_more(encode, framin
         assert len(hurt) <= accounted <= len(hurt) + 2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @both
 def test_a_million_damaged_bytes(encode, framing):
     rng = random.Random(2)

@@ -135,7 +135,7 @@ def test_unplugged_and_back_many_times_without_losing_a_descriptor(tmp_path):
     rig.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_hundred_unpluggings(tmp_path):
     rig = Rig(tmp_path / "tty")
     rig.open()

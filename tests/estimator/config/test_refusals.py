@@ -83,7 +83,7 @@ def test_hostile_text_takes_little_memory(name: str) -> None:
     assert words in line and peak < 16e6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_text_takes_little_time(name: str) -> None:
     """Processor time, the best of three."""

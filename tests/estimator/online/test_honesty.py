@@ -68,14 +68,13 @@ def one_run(seed):
     return float(error @ np.linalg.solve(covariance, error)), tick["resets"]
 
 
-@pytest.mark.parametrize("seeds, inside", [(6, 5), pytest.param(60, 54, marks=pytest.mark.slow)])
 @pytest.mark.long
-def test_a_rig_as_uncertain_as_stated_gives_estimates_as_uncertain_as_stated(seeds, inside):
+def test_a_rig_as_uncertain_as_stated_gives_estimates_as_uncertain_as_stated():
     """Original plant, every calibration and the soil drawn from its own sigma, three loads."""
-    squares, resets = zip(*(one_run(seed) for seed in range(seeds)), strict=True)
+    squares, resets = zip(*(one_run(seed) for seed in range(6)), strict=True)
     print(
         f"NEES {np.mean(squares):.2f} of 2,"
         f" {np.mean(np.array(squares) < 5.99):.0%} in the 95 % ellipse"
     )
-    assert sum(square < 5.99 for square in squares) >= inside
+    assert sum(square < 5.99 for square in squares) >= 5
     assert sum(resets) == 0

@@ -35,7 +35,7 @@ def is_subsequence(part: list, whole: list) -> bool:
 # ---- cut and flipped -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("compression", ["zstd", pytest.param("none", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("compression", ["zstd", pytest.param("none", marks=pytest.mark.long)])
 @pytest.mark.long
 def test_a_file_cut_at_any_byte_gives_a_prefix(tmp_path: Path, compression: str) -> None:
     """A power cut. At every offset: the whole chunks before it, and a line about the rest unless

@@ -76,7 +76,7 @@ def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
 )
 def test_a_demo_that_is_stopped_leaves_no_process_behind(number, tmp_path):
     with subprocess.Popen(

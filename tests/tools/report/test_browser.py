@@ -60,7 +60,7 @@ ZOOM = """<iframe id="f" style="width:1280px;height:900px" srcdoc="{page}"></ifr
 }}</script>"""
 MOST_PAGES = 6  # of A4, the configuration among them
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")]
 
 
 def browse(folder: Path, page: Path, *options: str) -> str:

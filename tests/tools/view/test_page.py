@@ -65,7 +65,7 @@ def test_values_are_those_of_their_tick(tab: Browser) -> None:
     assert tab.value("document.querySelector('#about').textContent").count("<b>") == 1  # as text
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @chromium
 @pytest.mark.parametrize("width, dark", [(360, False), (390, True), (768, False), (1920, True)])
 def test_nothing_is_wider_than_the_screen(tab: Browser, width: int, dark: bool) -> None:
@@ -76,7 +76,7 @@ def test_nothing_is_wider_than_the_screen(tab: Browser, width: int, dark: bool) 
     assert (sum(map(int, re.findall(r"\d+", paper))) < 200) == dark
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @chromium
 def test_pause_zoom_and_back_by_mouse_and_keys(tab: Browser) -> None:
     tab.wait("document.querySelector('#span').textContent.includes('UTC')")
@@ -99,7 +99,7 @@ def test_pause_zoom_and_back_by_mouse_and_keys(tab: Browser) -> None:
     tab.wait(f"document.querySelector('#span').textContent !== {before!r}")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @chromium
 def test_every_picture_has_words_and_prints(tab: Browser) -> None:
     images = "[...document.querySelectorAll('[role=img]')].map(e => e.getAttribute('aria-label'))"
@@ -108,7 +108,7 @@ def test_every_picture_has_words_and_prints(tab: Browser) -> None:
     assert tab.printed().startswith(b"%PDF")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @chromium
 def test_the_page_outlives_the_daemon(tmp_path: Path) -> None:
     socket = tmp_path / "gritd.sock"

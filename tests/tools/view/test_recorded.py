@@ -140,7 +140,7 @@ def test_a_campaign_that_cannot_be_computed_says_why(tmp_path: Path) -> None:
     assert campaign.answer["state"] == "failed" and "none.mcap" in campaign.answer["reason"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
 def test_runs_over_each_other_play_scrub_and_zoom(paths: list[Path], tmp_path: Path) -> None:
     pytest.importorskip("uvicorn", reason="needs gritd[view]")

@@ -141,7 +141,8 @@ class DeviceClock:
         """Whether the time of each frame of a chunk can be right."""
         delays = [self._delay(time, received) for time in times]
         right = self._possible(times, delays)
-        self._vote(times[-1], received, right[-1] and not self._went_back(times))
+        is_possible = right[-1] and not self._went_back(times)
+        self._vote(times[-1], received, is_possible)
 
         if not self._is_settled:
             if min(times) < self._second - LATE:
@@ -156,7 +157,7 @@ class DeviceClock:
         self._doubted = self._doubted if self._off else received
         self._off += 1
         right = [
-            is_right and not (delay > LATE and self._is_suspect(received - time))
+            is_right and not (delay > LATE and self._is_suspect(received - time, is_possible))
             for is_right, delay, time in zip(right, delays, times, strict=True)
         ]
         if received - max(self._heard, self._doubted) >= USELESS and not any(right):
@@ -223,9 +224,12 @@ class DeviceClock:
         self.step = (before - self._line.at(first.time)) * 1e-9
         return True
 
-    def _is_suspect(self, offset: int) -> bool:
-        """Whether a late frame belongs to others that nothing but a step explains."""
-        since = [vote for vote in self._votes if vote.received >= self._doubted]
+    def _is_suspect(self, offset: int, is_possible: bool) -> bool:
+        """Whether a late frame belongs to others that nothing but a step explains. Its own vote may
+        be that of several, so it is judged by itself.
+        """
+        votes = [*self._votes[:-1], self._votes[-1]._replace(is_possible=is_possible)]
+        since = [vote for vote in votes if vote.received >= self._doubted]
         return sum(not v.is_possible and abs(offset - v.offset) <= LATE for v in since) > 1
 
     # --- stamps

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -149,7 +149,8 @@ def contact(
     by_sliding: float = 0.0,
     order: int = ORDER,
 ) -> ContactStresses:
-    """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones.
+    """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones. θₘ
+    follows (5) unless given; θ₂ is 0 as in the paper.
 
     Under a wheel that slides sideways the shear stress has the direction of the displacement j of
     the soil; by_sliding: share in which it has that of the sliding of the rim instead.
@@ -199,35 +200,10 @@ def integrate(wheel: Wheel, contact: ContactStresses) -> OriginalForces:
 
 
 def forces(
-    wheel: Wheel,
-    soil: Soil,
-    theta_1: Scalar,
-    slip: Scalar,
-    *,
-    theta_m: Scalar | None = None,
-    theta_2: Scalar = 0.0,
-    mobilisation: Mobilisation = janosi,
-    side_slip: Scalar = 0.0,
-    by_sliding: float = 0.0,
-    order: int = ORDER,
+    wheel: Wheel, soil: Soil, theta_1: Scalar, slip: Scalar, **contacting: Any
 ) -> OriginalForces:
-    """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the
-    paper.
-    """
-    stresses = contact(
-        wheel,
-        soil,
-        theta_1,
-        slip,
-        theta_m=theta_m,
-        theta_2=theta_2,
-        mobilisation=mobilisation,
-        side_slip=side_slip,
-        by_sliding=by_sliding,
-        order=order,
-    )
-
-    return integrate(wheel, stresses)
+    """DP, W, T and resistance of Eqs. (8)-(10); contacting: what `contact` may be given besides."""
+    return integrate(wheel, contact(wheel, soil, theta_1, slip, **contacting))
 
 
 _peak = theta_m  # `contact` has an argument of that name

@@ -58,7 +58,7 @@ def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> Iterator[str]:
     other = "rival" if diagnosis.accepted else "not accepted"
     head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
     head += f", form off by {percent(of.other_forms)}" if of.other_forms else ""
-    values = _listed(of.parameters)
+    values = _listed(of.known)
     others = of.indistinguishable_from
     alike = f"; cannot be distinguished from {', '.join(others)}" if others else ""
     yield f"{head}{f': {values}' if values else ''}{alike}"

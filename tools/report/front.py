@@ -111,7 +111,7 @@ def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
 
 def _accepted(diagnosis: Diagnosis, h: Hypothesis) -> tuple[str, str, str]:
     """An effect or an undistinguished group, with its probability and its strength."""
-    parameters = "; ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items())
+    parameters = "; ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.known.items())
     group = simplest_first(diagnosis, h)
     if len(group) == 1:
         return name_of(h.effect), f"{percent(h.probability)} probable", parameters

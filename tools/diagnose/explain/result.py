@@ -93,6 +93,12 @@ class Hypothesis:
     )  # rival -> what would distinguish them, in words
     other_forms: float = 0.0
 
+    @property
+    def known(self) -> Mapping[str, Quantity]:
+        """The parameters that are more than their σ; all where none is."""
+        there = {n: q for n, q in self.parameters.items() if abs(q.value) > q.sigma}
+        return there or self.parameters
+
 
 SOIL = {  # in words
     "c": "cohesion c",

@@ -13,6 +13,7 @@ import numpy as np
 
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.random_effect import Sizes, freedom
 from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screening import Screening
@@ -35,8 +36,7 @@ def unexplained_with(screening: Screening, model: Model) -> UnexplainedTerms | N
     chosen, price = _chosen(screening, model)
     if not chosen:
         return None
-    fitted = [_fitted(screening, model, chosen, size) for size in TUNING.verdict.function_sizes]
-    best = max(fitted, key=lambda m: m.evidence)
+    best = _fitted(screening, model, chosen)
     gain = best.evidence - model.evidence + price
     return UnexplainedTerms(best, tuple(chosen), gain) if gain > 0.0 else None
 
@@ -46,17 +46,20 @@ def unexplained_functions(screening: Screening, model: Model) -> list[Signature]
     return _chosen(screening, model)[0]
 
 
-def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature], size: float) -> Model:
-    columns = size * np.column_stack([s.columns for s in chosen])
-    fitted = model.fitted
+def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> Model:
+    """With functions of a size that the recordings tell."""
+    problem, fitted = screening.problem, model.fitted
+    columns, values = np.column_stack([s.columns for s in chosen]), TUNING.verdict.function_sizes
+    sizes = Sizes(values, tuple(1.0 for _ in values))
+    functions = freedom("unexplained", columns, problem.noise, sizes)
 
     return fit_model(
-        screening.problem.beside(columns),
-        screening.forms,
+        problem,
+        (*screening.forms, functions),
         fitted.effects,
         fitted.free,
         (fitted.u, fitted.x),
-        model.sizes,
+        (*model.sizes, 0),
         model.other_forms,
         fitted,
     )

@@ -88,10 +88,9 @@ class Objective(Protocol[Linearised, Tried]):
     def linearised(self, tried: Tried) -> Linearised: ...
 
     def moved(self, here: Any, tried: Tried) -> Linearised:
-        """There, with the slopes of a place so near that they are the same."""
-
-    def followed(self, here: Any, tried: Tried) -> Linearised:
-        """There, with new slopes of few coordinates: the others hardly change."""
+        """There, with the slopes of a place near by, corrected by what the way there showed of them
+        (Broyden 1965, Mathematics of Computation 19, 577-593).
+        """
 
 
 def descend(
@@ -131,11 +130,8 @@ def descend(
 
         if better is None:
             return here, False
-        near = expected < TUNING.fit.near and not bent
-        if near:
+        if share > TUNING.fit.good and not bent:
             here, unsure = ground.moved(here, better), better
-        elif share > TUNING.fit.good and not bent:
-            here, unsure = ground.followed(here, better), better
         else:
             here, unsure = ground.linearised(better), None
     if unsure is not None:

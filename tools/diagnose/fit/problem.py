@@ -291,11 +291,18 @@ class EffectsObjective:
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
-        """There, with the derivatives of a fit that stands next to it."""
-        if here.nuisance is self._problem.nuisance:
-            return self._fitted(tried, here.raw, here.own, here.pulled, here.curvature)
-        pulled = self._problem.nuisance.pulled(here.own)
-        return self._fitted(tried, here.raw, here.own, pulled, self._curvature(here.own, pulled))
+        """There, with the derivatives of a fit near by, as the way there corrects them."""
+        problem = self._problem
+        raw, own, step = here.raw, here.own, tried.centre - here.centre
+        if step.any():
+            missed = tried.predicted - here.predicted - raw @ step
+            along = step / (step @ step)
+            raw = raw + np.outer(missed, along)
+            own = own + np.outer(whiten(problem.noise, missed), along)
+        elif here.nuisance is problem.nuisance:
+            return self._fitted(tried, raw, own, here.pulled, here.curvature)
+        pulled = problem.nuisance.pulled(own)
+        return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def followed(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with new derivatives by the effects' parameters; those by the constants, which

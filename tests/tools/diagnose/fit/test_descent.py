@@ -44,8 +44,6 @@ class _Bowl:
     def moved(self, here: _Place, tried: Array) -> _Place:
         return self.linearised(tried)
 
-    followed = moved
-
     def least(self) -> float:
         return float(lsq_linear(self.a, self.b, (-FAR, FAR), tol=1e-12).cost)
 
@@ -87,8 +85,6 @@ class _Bend:
 
     def moved(self, here: _Place, tried: Array) -> _Place:
         return self._place(here.centre, tried)
-
-    followed = moved
 
     def _place(self, slopes_at: Array, centre: Array) -> _Place:
         slopes = np.array([[self.steep, -2.0 * self.steep * slopes_at[1]], [0.0, -1.0]])
@@ -147,8 +143,6 @@ class _Hidden:
 
     def moved(self, here: _Place, tried: Array) -> _Place:
         return self._place(here.centre, tried)
-
-    followed = moved
 
     def _place(self, slopes_at: Array, centre: Array) -> _Place:
         x, y = slopes_at

@@ -65,7 +65,7 @@ def diagnose(
 def first_answer() -> Iterator[None]:
     """The search ends after the likeliest single effects."""
     few = TUNING.search.effects_quick
-    with replaced("search", effects_first=few, most_effects=1):
+    with replaced("search", effects_first=few, later=()):
         yield
 
 

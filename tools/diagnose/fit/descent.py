@@ -17,6 +17,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import DAMPING_LEAST, ROUNDING
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +33,13 @@ class CoordinateBounds:
 
     def reached(self, centre: Array) -> Bools:
         """Coordinates (n,) that stand at a bound."""
-        at: Bools = (centre <= self.low + TUNING.fit.at_bound) | (
-            centre >= self.high - TUNING.fit.at_bound
-        )
+        at: Bools = (centre <= self.low + ROUNDING) | (centre >= self.high - ROUNDING)
         return at
 
     def held(self, centre: Array, gradient: Array) -> Bools:
         """Coordinates (n,) that stand at a bound and want out."""
-        held: Bools = ((centre <= self.low + TUNING.fit.at_bound) & (gradient > 0.0)) | (
-            (centre >= self.high - TUNING.fit.at_bound) & (gradient < 0.0)
+        held: Bools = ((centre <= self.low + ROUNDING) & (gradient > 0.0)) | (
+            (centre >= self.high - ROUNDING) & (gradient < 0.0)
         )
         return held
 
@@ -104,7 +103,7 @@ def descend(
 
     for _ in range(rounds):
         held, better = ground.bounds.held(here.centre, here.gradient), None
-        while better is None and damping < TUNING.fit.damping_most:
+        while better is None and damping < 1.0 / DAMPING_LEAST:
             step = bounded_step(here, ground.bounds, held, damping)
             expected = _gain(here, step)
             small = abs(expected) < TUNING.fit.gain
@@ -115,18 +114,18 @@ def descend(
 
             if share > TUNING.fit.fulfilled:
                 better, again = tried, False
-                softer = TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0
-                damping = max(damping * softer, TUNING.fit.damping_least)
+                softer = 1.0 / TUNING.fit.damping if share > TUNING.fit.good else 1.0
+                damping = max(damping * softer, DAMPING_LEAST)
             elif unsure is not None:  # nothing to gain, or misled, by these slopes
                 here, unsure = ground.linearised(unsure), None
                 held = ground.bounds.held(here.centre, here.gradient)
                 damping = TUNING.fit.damping_start if small else damping
             elif not small:
-                damping *= TUNING.fit.damping_harder
+                damping *= TUNING.fit.damping
             elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.flat:
-                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.near
+                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.flat
             else:
-                again, damping = True, TUNING.fit.damping_least  # the damping alone made it small
+                again, damping = True, DAMPING_LEAST  # the damping alone made it small
 
         if better is None:
             return here, False
@@ -160,7 +159,7 @@ def _attempt(
 def _undamped_gain(here: DescentPoint, bounds: CoordinateBounds) -> float:
     """What the step without damping would gain by the linearised function [nats]."""
     held = bounds.held(here.centre, here.gradient)
-    return _gain(here, bounded_step(here, bounds, held, TUNING.fit.damping_least))
+    return _gain(here, bounded_step(here, bounds, held, DAMPING_LEAST))
 
 
 def _gain(here: DescentPoint, step: Array) -> float:
@@ -174,7 +173,7 @@ def bounded_step(
     """The damped step (n,) that leaves no bound: coordinates that would are put on theirs."""
     held, step = held.copy(), np.zeros(here.centre.size)
     low, high = bounds.low - here.centre, bounds.high - here.centre
-    for _ in range(TUNING.fit.held_sets):
+    for _ in range(here.centre.size):
         free = np.flatnonzero(~held)
         if not free.size:
             break
@@ -184,7 +183,7 @@ def bounded_step(
         damped = curvature + damping * np.diag(np.diag(curvature))
         step[free] = -np.linalg.solve(damped, pull)
 
-        beyond = ~held & ((step < low - TUNING.fit.at_bound) | (step > high + TUNING.fit.at_bound))
+        beyond = ~held & ((step < low - ROUNDING) | (step > high + ROUNDING))
         if not beyond.any():
             break
         step = np.asarray(np.clip(step, low, high))

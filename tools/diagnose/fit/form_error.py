@@ -36,12 +36,12 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
+from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, even, freedom
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SQUARE
+from gritd.tools.diagnose.tuning.guards import DEPENDENT, SQUARE
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
 NOWHERE = ("drivetrain",)  # stages that know of no place on the bed
@@ -155,7 +155,7 @@ def _place_sizes() -> Sizes:
 
 
 def _free_zero_sizes() -> Sizes:
-    return Sizes(TUNING.fit.free_zero_sizes, TUNING.fit.free_zero_prior)
+    return even(TUNING.fit.free_zero_sizes)
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
@@ -230,7 +230,7 @@ def _where_most(stack: Stack, noise: Noise, added: Array) -> Array:
 def _beside(noise: Noise, columns: Array, fitted: Fitted, own: Index) -> Array:
     """Columns (N, m) without what the effects' parameters, unknowns `own` of a fit, can do."""
     whitened = whiten(noise, columns)
-    share = np.linalg.lstsq(fitted.own[:, own], whitened, rcond=TUNING.fit.dependent)[0]
+    share = np.linalg.lstsq(fitted.own[:, own], whitened, rcond=DEPENDENT)[0]
     return np.asarray(columns - fitted.raw[:, own] @ share)
 
 

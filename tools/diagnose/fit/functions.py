@@ -141,7 +141,7 @@ def _families(stack: Stack) -> Iterator[tuple[tuple[str, ...], Array]]:
 
     angle = stack.covariate("wheel_angle")
     if np.ptp(angle) > 2.0 * np.pi:
-        turns = [f(o * angle) * moving for o in TUNING.fit.turn_orders for f in (np.cos, np.sin)]
+        turns = [f(o * angle) * moving for o in TUNING.fit.form_harmonics for f in (np.cos, np.sin)]
         yield ("wheel_angle",), np.column_stack(turns)
 
 

@@ -105,12 +105,11 @@ class Marginal:
         the sizes about them.
         """
         chosen = start
-        for _ in range(TUNING.fit.size_sweeps):
+        before: Chosen | None = None
+        while chosen != before:
             before = chosen
             for number in range(len(self.terms)):
                 chosen = max(self._along(chosen, number), key=self.log_evidence)
-            if chosen == before:
-                break
 
         top = average = self.log_evidence(chosen)
         for number in range(len(self.terms)):

@@ -36,6 +36,11 @@ class Sizes:
         return np.log(np.array(self.prior) / sum(self.prior))
 
 
+def even(values: tuple[float, ...]) -> Sizes:
+    """Sizes of which none is likelier than another."""
+    return Sizes(values, tuple(1.0 for _ in values))
+
+
 @dataclass(frozen=True, eq=False)
 class RandomEffect:
     """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise.

@@ -256,7 +256,7 @@ def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Sig
     before, after = np.concatenate((edge, best[:-1])), np.concatenate((best[1:], edge))
     top = np.flatnonzero((best >= before) & (best > after) & (best + share > 0.0))
 
-    for place in top[np.argsort(-best[top])][: TUNING.screen.peaks]:
+    for place in top[np.argsort(-best[top])][: TUNING.search.again]:
         shared = family.phases[int(np.argmax(every[:, place]))]
         wave = family.shape.kind == "wave"
         at = float(family.at[place])
@@ -340,7 +340,7 @@ def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
     """Also ripples that are too fast for the grid: there they would pass for slow waves."""
     for column in line_columns(stack, unheld=True).T:
         sizes = [size_of(stack, channel) for channel in stack.rig.channels]
-        yield TUNING.screen.large_ripple * np.array(sizes)[stack.channel] * column
+        yield TUNING.fit.strength_prior * np.array(sizes)[stack.channel] * column
 
     for effect in fitted.acting:
         if effect.fingerprint.covariate == "wheel_angle":
@@ -349,7 +349,7 @@ def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
 
             for channel in stack.rig.channels:
                 own = stack.of(channel) & (stack.covariate("speed") > 0.0)
-                for number in range(1, TUNING.screen.ripple_harmonics + 1):
+                for number in range(1, TUNING.fit.harmonics + 1):
                     for wave in (np.cos, np.sin):
-                        large = TUNING.screen.large_ripple * size_of(stack, channel)
+                        large = TUNING.fit.strength_prior * size_of(stack, channel)
                         yield np.where(own, large * wave(number * phase), 0.0)

@@ -104,10 +104,7 @@ def search_models(
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
-    later = zip(TUNING.search.starts, TUNING.search.effects_later, strict=True)
-    for size, (starts, most) in enumerate(later, start=1):
-        if size == TUNING.search.most_effects:
-            break
+    for size, (starts, most) in enumerate(TUNING.search.later, start=1):
         begun = search.sized(size)[:starts]
         if begun:
             names = ", or ".join(" and ".join(m.names) for m in begun)
@@ -211,8 +208,8 @@ def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
         effects = search.problem.stack.rig.effects
         names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
     top = max((beside.gain(name) for name in names), default=0.0)
-    alone = TUNING.search.little if model.names else TUNING.search.promising
-    least = max(alone, TUNING.search.predicted_share * top - TUNING.search.predicted_less)
+    alone = TUNING.search.little if model.names else 0.0
+    least = max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
     likely = [name for name in names if beside.gain(name) > least]
     return [
         Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
@@ -230,7 +227,7 @@ def _starts(search: EffectSearch, model: Model, beside: Pass, name: str) -> tupl
     )
     if model.names or not edges:
         return tuple(every[:1])
-    apart = _apart(every)[: TUNING.search.elsewhere]
+    apart = _apart(every)[: TUNING.search.again]
     return tuple(one for one in apart if one.evidence > beside.alone) or tuple(every[:1])
 
 

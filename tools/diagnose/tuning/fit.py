@@ -44,15 +44,9 @@ class FitTuning:
     free_zero_sizes: tuple[float, ...] = tuned(
         (0.0, 0.1, 0.5, 2.0), "-", "of an effect, over what no law says how it goes"
     )
-    free_zero_prior: tuple[float, ...] = tuned(
-        (0.25, 0.25, 0.25, 0.25), "prior", "probability of each of the sizes", "judgement"
-    )
-    harmonics: int = tuned(4, "-", "of a ripple that its profile may have besides", "judgement")
+    harmonics: int = tuned(4, "-", "of a ripple that it may have besides", "judgement")
     following_arcs: tuple[float, ...] = tuned(
         (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
-    )
-    dependent: float = tuned(
-        1e-6, "-", "of the largest singular value: parameters that do the same", "rounding"
     )
 
     # --- descent.py ---
@@ -62,16 +56,12 @@ class FitTuning:
         "nats",
         "a step that would gain more without its damping is tried before a descent ends",
     )
-    near: float = tuned(1.0, "nats", "a good step that gains less leaves the slopes as they are")
     damping_start: float = tuned(1e-3, "-", "of the curvature: first damping")
-    damping_least: float = tuned(1e-7, "-", "of the curvature")
-    damping_most: float = tuned(1e7, "-", "of the curvature: a descent that needs more has ended")
-    damping_harder: float = tuned(8.0, "-", "factor on the damping after a step that failed")
-    damping_softer: float = tuned(0.2, "-", "factor on the damping after a good step")
-    fulfilled: float = tuned(0.1, "-", "of the expected gain: a step is taken")
-    good: float = tuned(0.75, "share", "of the expected gain: the damping falls")
-    at_bound: float = tuned(1e-9, "-", "closer to a bound a coordinate is on it", "rounding")
-    held_sets: int = tuned(8, "times", "the set of held coordinates may grow within one step")
+    damping: float = tuned(
+        5.0, "-", "factor on the damping after a step that failed; after a good one its inverse"
+    )
+    fulfilled: float = tuned(0.1, "-", "of the gain foretold: a step is taken")
+    good: float = tuned(0.75, "share", "of the gain foretold: the damping falls")
 
     # --- discrepancy.py ---
     form_sizes: tuple[float, ...] = tuned(
@@ -102,7 +92,7 @@ class FitTuning:
         0.2, "-", "size of what goes with the wheel's angle, in that of the discrepancy"
     )
     form_harmonics: tuple[float, ...] = tuned(
-        (1.0, 2.0), "choice", "a turn: of what goes with the wheel's angle"
+        (1.0, 2.0), "choice", "a turn: of what goes with the wheel's angle; higher: listed effects"
     )
 
     # --- evidence.py ---
@@ -117,10 +107,7 @@ class FitTuning:
     waves: int = tuned(4, "cosines", "along time or place")
     varies: float = tuned(1e-3, "-", "relative spread below which a covariate does not vary")
     outlying: float = tuned(4.0, "σ", "a standardised covariate is cut beyond it")
-    cosines: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
-    turn_orders: tuple[float, ...] = tuned(
-        (1.0, 2.0), "choice", "ripples a turn that no smooth term takes; higher: listed effects"
-    )
+    bends: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
 
     # --- heldout.py ---
     folds: int = tuned(3, "parts", "of which each is predicted by the others, where runs are fewer")
@@ -129,7 +116,6 @@ class FitTuning:
 
     # --- marginal.py, model.py ---
     slight_size: float = tuned(1e-3, "-", "weight of sizes below which they do not count")
-    size_sweeps: int = tuned(4, "sweeps", "over the random effects, each to its likeliest size")
     size_rounds: int = tuned(
         5, "rounds", "of fit and sizes in turn", "nearly always two are enough"
     )
@@ -153,9 +139,6 @@ class FitTuning:
     # --- shared.py: what the reference shows already ---
     shared_sizes: tuple[float, ...] = tuned(
         (0.0, 0.3, 1.0, 3.0), "expected sizes", "of the library's effects in both campaigns"
-    )
-    shared_prior: tuple[float, ...] = tuned(
-        (0.25, 0.25, 0.25, 0.25), "prior", "probability of each of the sizes", "judgement"
     )
     shared_least: float = tuned(
         0.3, "squares of the noise", "a direction that shows less is left out", "run time"

@@ -53,9 +53,6 @@ class ScreenTuning:
     step_width: float = tuned(
         0.015, "-", "of the whole stretch: a wheel is on both sides of a step for a while"
     )
-    peaks: int = tuned(4, "shapes", "of a family that are fitted", "run time")
-    ripple_harmonics: int = tuned(4, "harmonics", "of a ripple that is known")
-    large_ripple: float = tuned(3.0, "-", "their standard deviation in expected sizes")
     frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")
 
     @property

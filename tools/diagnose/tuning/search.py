@@ -13,18 +13,14 @@ class SearchTuning:
 
     effects_first: int = tuned(7, "effects", "fitted beside the base model", "run time")
     effects_quick: int = tuned(3, "effects", "fitted for a first answer", "run time")
-    starts: tuple[int, ...] = tuned(
-        (2, 1), "models", "of one effect, of two, beside which one more is looked for", "run time"
+    later: tuple[tuple[int, int], ...] = tuned(
+        ((2, 4), (1, 2)),
+        "models",
+        "of one effect, of two, beside which one more is looked for, and with it are fitted",
+        "run time",
     )
-    effects_later: tuple[int, ...] = tuned(
-        (4, 2), "models", "of two effects, of three, that are fitted", "run time"
-    )
-    most_effects: int = tuned(3, "effects", "of a model, at most", "run time")
     again: int = tuned(
-        4, "signatures", "of an effect tried beside a model: the screen's likeliest", "run time"
-    )
-    elsewhere: int = tuned(
-        4, "starts", "of a fit whose effect has edges, at other places", "run time"
+        4, "shapes", "of one effect or family tried again, or as starts: the likeliest", "run time"
     )
     little: float = tuned(
         8.0,
@@ -34,8 +30,7 @@ class SearchTuning:
         "far below the model that it holds begins anew",
         "run time",
     )
-    promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
-    predicted_share: float = tuned(
+    promised_share: float = tuned(
         0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
     )
     predicted_less: float = tuned(6.0, "nats", "less than that share", "run time")

@@ -28,12 +28,8 @@ class Verdict:
         "of an effect where nothing shows, shared by all candidates",
         "of ten testbeds with one effect left out, one or two have a second that shows",
     )
-    there: float = tuned(0.5, "probability", "of an effect of the best explanation, to be accepted")
     equally_likely: float = tuned(
         2.0, "odds", "of explanations of as many effects, below which the simplest comes first"
-    )
-    resembles: float = tuned(
-        0.5, "probability", "of an explanation whose names are not accepted, to be reported"
     )
 
     # --- resemblance.py, of each of `fit.form_error_sizes` ---
@@ -67,7 +63,4 @@ class Verdict:
     )
 
     # --- unexplained.py ---
-    function_sizes: tuple[float, ...] = tuned(
-        (1.0, 5.0), "-", "of a function, in its expected size, where it is fitted"
-    )
     together: int = tuned(4, "functions", "that may act together", "run time")

@@ -115,12 +115,12 @@ def judged(
     best = _best([w for w in every if w.names] or every)
     trust = _trust(every, best)
     least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
-    kept = [n for n in best.names if least[n] > TUNING.verdict.there and probability[n] > unlisted]
-    named, share = _named(search, best, kept)
-    whole = beside[named] if named in beside else _with_unexplained(search, named)
-    predicts = not named.names or _predicts(search, whole.model if whole is not None else named)
-    if not predicts:
-        named, share, whole = search.bare, 0.0, beside.get(search.bare)
+    kept = [n for n in best.names if _likely(least[n]) and probability[n] > unlisted]
+    told, share = _told(search, best, kept)
+    whole = beside[told] if told in beside else _with_unexplained(search, told)
+    foretold = not told.names or _foretold(search, whole.model if whole is not None else told)
+    if not foretold:
+        told, share, whole = search.bare, 0.0, beside.get(search.bare)
 
     return Decision(
         "explained" if named.names else "unlisted",
@@ -134,13 +134,17 @@ def judged(
         tuple(
             Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
             for name in best.names
-            if name not in named.names
-            and best.share * _weight(every, best) > TUNING.verdict.resembles
+            if name not in told.names and _likely(best.share * _weight(every, best))
         ),
     )
 
 
-def _with_unexplained(search: EffectSearch, model: Model) -> UnexplainedTerms | None:
+def _likely(probability: float) -> bool:
+    """Likelier than not."""
+    return probability > 1.0 - probability
+
+
+def _with_unexplained(search: EffectSearch, model: Model) -> Nameless | None:
     return attempted(lambda: unexplained_with(search.screening, model))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.random_effect import Sizes, freedom
+from gritd.tools.diagnose.fit.random_effect import even, freedom
 from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screening import Screening
@@ -49,9 +49,8 @@ def unexplained_functions(screening: Screening, model: Model) -> list[Signature]
 def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> Model:
     """With functions of a size that the recordings tell."""
     problem, fitted = screening.problem, model.fitted
-    columns, values = np.column_stack([s.columns for s in chosen]), TUNING.verdict.function_sizes
-    sizes = Sizes(values, tuple(1.0 for _ in values))
-    functions = freedom("unexplained", columns, problem.noise, sizes)
+    columns = np.column_stack([s.columns for s in chosen])
+    functions = freedom("unexplained", columns, problem.noise, even(TUNING.fit.strength_sizes))
 
     return fit_model(
         problem,

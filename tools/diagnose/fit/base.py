@@ -44,9 +44,7 @@ def fit_roughly(stack: Stack) -> BaseFit:
     noise = first_guess(stack, stack.predict(start))
 
     problem = Problem(stack, noise, allowed(stack))
-    return BaseFit(
-        problem, Model(problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds))
-    )
+    return BaseFit(problem, Model(problem.descend((), (), start, np.zeros(0))))
 
 
 def explainable(rough: BaseFit) -> Explainable:

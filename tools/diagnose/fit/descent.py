@@ -91,6 +91,9 @@ class Objective(Protocol[Linearised, Tried]):
         (Broyden 1965, Mathematics of Computation 19, 577-593).
         """
 
+    def followed(self, here: Any, tried: Tried) -> Linearised:
+        """There, with new slopes of few coordinates: the others hardly change."""
+
 
 def descend(
     ground: Objective[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
@@ -99,7 +102,7 @@ def descend(
 
     unsure: where it stands, if its slopes are those of another place.
     """
-    here, damping, again = start, TUNING.fit.damping_start, False
+    here, damping, again, failed = start, TUNING.fit.damping_start, False, False
 
     for _ in range(rounds):
         held, better = ground.bounds.held(here.centre, here.gradient), None
@@ -113,26 +116,25 @@ def descend(
                 tried, share, bent = _attempt(ground, here, step, expected, damping)
 
             if share > TUNING.fit.fulfilled:
-                better, again = tried, False
+                better, again, failed = tried, False, False
                 softer = 1.0 / TUNING.fit.damping if share > TUNING.fit.good else 1.0
                 damping = max(damping * softer, DAMPING_LEAST)
-            elif unsure is not None:  # nothing to gain, or misled, by these slopes
-                here, unsure = ground.linearised(unsure), None
+            elif unsure is not None and (small or failed):  # by these slopes
+                here, unsure, failed = ground.linearised(unsure), None, False
                 held = ground.bounds.held(here.centre, here.gradient)
                 damping = TUNING.fit.damping_start if small else damping
             elif not small:
-                damping *= TUNING.fit.damping
-            elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.flat:
-                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.flat
+                damping, failed = damping * TUNING.fit.damping, True
+            elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain:
+                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.gain
             else:
                 again, damping = True, DAMPING_LEAST  # the damping alone made it small
 
         if better is None:
             return here, False
-        if share > TUNING.fit.good and not bent:
-            here, unsure = ground.moved(here, better), better
-        else:
-            here, unsure = ground.linearised(better), None
+        here, unsure = ground.moved(here, better), better
+        if bent or share <= TUNING.fit.good:
+            here = ground.followed(here, better)
     if unsure is not None:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain

@@ -23,7 +23,6 @@ class FitTuning:
     tolerance: float = tuned(
         5e-4, "-", "of a channel's size: integration rules and idealised servos are off by it"
     )
-    rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
 
     # --- form_error.py: how far published forms of an effect differ ---
     form_error_sizes: tuple[float, ...] = tuned(
@@ -50,11 +49,8 @@ class FitTuning:
     )
 
     # --- descent.py ---
-    gain: float = tuned(0.005, "nats", "a step that would gain less ends the descent")
-    flat: float = tuned(
-        0.1,
-        "nats",
-        "a step that would gain more without its damping is tried before a descent ends",
+    gain: float = tuned(
+        0.05, "nats", "a step that would gain less ends the descent: linear algebra tells the rest"
     )
     damping_start: float = tuned(1e-3, "-", "of the curvature: first damping")
     damping: float = tuned(

@@ -44,6 +44,8 @@ class _Bowl:
     def moved(self, here: _Place, tried: Array) -> _Place:
         return self.linearised(tried)
 
+    followed = moved
+
     def least(self) -> float:
         return float(lsq_linear(self.a, self.b, (-FAR, FAR), tol=1e-12).cost)
 

@@ -102,33 +102,28 @@ def descend(
 
     unsure: where it stands, if its slopes are those of another place.
     """
-    here, damping, again, failed = start, TUNING.fit.damping_start, False, False
+    here, damping, failed = start, TUNING.fit.damping_start, False
 
     for _ in range(rounds):
-        held, better = ground.bounds.held(here.centre, here.gradient), None
+        better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
-            step = bounded_step(here, ground.bounds, held, damping)
-            expected = _gain(here, step)
-            small = abs(expected) < TUNING.fit.gain
+            done = abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
+            if done and unsure is None:
+                return here, True
+            if unsure is not None and (done or failed):  # by these slopes
+                here, unsure, failed = ground.linearised(unsure), None, False
+                continue
 
+            step = bounded_step(here, ground.bounds, _held(ground, here), damping)
             tried, share, bent = None, 0.0, False
-            if not small and expected > 0.0:  # bounds may cut a step into one that loses
+            if (expected := _gain(here, step)) > 0.0:  # bounds may cut a step into one that loses
                 tried, share, bent = _attempt(ground, here, step, expected, damping)
-
             if share > TUNING.fit.fulfilled:
-                better, again, failed = tried, False, False
+                better, failed = tried, False
                 softer = 1.0 / TUNING.fit.damping if share > TUNING.fit.good else 1.0
                 damping = max(damping * softer, DAMPING_LEAST)
-            elif unsure is not None and (small or failed):  # by these slopes
-                here, unsure, failed = ground.linearised(unsure), None, False
-                held = ground.bounds.held(here.centre, here.gradient)
-                damping = TUNING.fit.damping_start if small else damping
-            elif not small:
-                damping, failed = damping * TUNING.fit.damping, True
-            elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain:
-                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.gain
             else:
-                again, damping = True, DAMPING_LEAST  # the damping alone made it small
+                damping, failed = damping * TUNING.fit.damping, True
 
         if better is None:
             return here, False
@@ -138,6 +133,10 @@ def descend(
     if unsure is not None:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
+
+
+def _held(ground: Objective[Here, Tried], here: Here) -> Bools:
+    return ground.bounds.held(here.centre, here.gradient)
 
 
 def _attempt(
@@ -152,8 +151,7 @@ def _attempt(
         return tried, share, share <= TUNING.fit.good
 
     there = ground.moved(here, tried)
-    held = ground.curved | ground.bounds.held(there.centre, there.gradient)
-    follow = bounded_step(there, ground.bounds, held, damping)
+    follow = bounded_step(there, ground.bounds, ground.curved | _held(ground, there), damping)
     beside, lower = ground.tried(ground.bounds.clipped(there.centre + follow))
     return (beside, (here.nats - lower) / expected, True) if lower < nats else (tried, share, True)
 

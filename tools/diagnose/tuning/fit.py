@@ -120,7 +120,7 @@ class FitTuning:
 
     # --- problem.py ---
     step: float = tuned(2e-3, "-", "of a prior σ or an expected size, for differences")
-    rounds: int = tuned(30, "rounds", "linearisations at most: more is no convergence")
+    rounds: int = tuned(12, "rounds", "of a descent at most: sizes are learnt in between")
     far: float = tuned(8.0, "σ", "constants are kept this close to what is known of them")
     strength_prior: float = tuned(
         3.0, "-", "a strength's prior standard deviation, in expected sizes"

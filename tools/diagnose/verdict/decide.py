@@ -148,9 +148,9 @@ def _with_unexplained(search: EffectSearch, model: Model) -> Nameless | None:
     return attempted(lambda: unexplained_with(search.screening, model))
 
 
-def _predicts(search: EffectSearch, whole: Model) -> bool:
-    """Whether a model misses less than the equations alone of runs that were held out."""
-    return missed(search.problem, whole.fitted) < missed(search.problem, search.base.fitted)
+def _foretold(search: EffectSearch, whole: Model) -> bool:
+    """Whether a model misses less than the discrepancy of form alone of runs that were held out."""
+    return missed(search.problem, whole.fitted) < missed(search.problem, search.bare.fitted)
 
 
 def trusting(

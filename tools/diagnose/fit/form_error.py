@@ -36,7 +36,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, even, freedom
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack

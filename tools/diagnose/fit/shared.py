@@ -27,7 +27,7 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import Freedom, Sizes, even
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -102,11 +102,11 @@ def _least_absolute(columns: Array, values: Array) -> Array:
 
 def shared_terms(
     noise: Noise, shared: Mapping[str, Array], ripples: Array
-) -> tuple[Freedom, ...]:
-    """Freedoms of the effects (N, m) by what they are of, and the ripples (N, r)."""
+) -> tuple[RandomEffect, ...]:
+    """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = even(TUNING.fit.shared_sizes)
-    freedoms = [
-        Freedom(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
+    terms = [
+        RandomEffect(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
         for part, columns in shared.items()
     ]
     if ripples.shape[1]:

@@ -209,7 +209,7 @@ def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
         names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
     top = max((beside.gain(name) for name in names), default=0.0)
     alone = TUNING.search.little if model.names else 0.0
-    least = max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
+    least = max(alone, TUNING.search.predicted_share * top - TUNING.search.predicted_less)
     likely = [name for name in names if beside.gain(name) > least]
     return [
         Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))

@@ -56,8 +56,8 @@ class FitTuning:
     damping: float = tuned(
         5.0, "-", "factor on the damping after a step that failed; after a good one its inverse"
     )
-    fulfilled: float = tuned(0.1, "-", "of the gain foretold: a step is taken")
-    good: float = tuned(0.75, "share", "of the gain foretold: the damping falls")
+    fulfilled: float = tuned(0.1, "-", "of the expected gain: a step is taken")
+    good: float = tuned(0.75, "share", "of the expected gain: the damping falls")
 
     # --- discrepancy.py ---
     form_sizes: tuple[float, ...] = tuned(
@@ -103,7 +103,7 @@ class FitTuning:
     waves: int = tuned(4, "cosines", "along time or place")
     varies: float = tuned(1e-3, "-", "relative spread below which a covariate does not vary")
     outlying: float = tuned(4.0, "σ", "a standardised covariate is cut beyond it")
-    bends: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
+    cosines: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
 
     # --- heldout.py ---
     folds: int = tuned(3, "parts", "of which each is predicted by the others, where runs are fewer")

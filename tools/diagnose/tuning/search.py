@@ -30,7 +30,7 @@ class SearchTuning:
         "far below the model that it holds begins anew",
         "run time",
     )
-    promised_share: float = tuned(
+    predicted_share: float = tuned(
         0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
     )
     predicted_less: float = tuned(6.0, "nats", "less than that share", "run time")

@@ -116,11 +116,11 @@ def judged(
     trust = _trust(every, best)
     least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
     kept = [n for n in best.names if _likely(least[n]) and probability[n] > unlisted]
-    told, share = _told(search, best, kept)
-    whole = beside[told] if told in beside else _with_unexplained(search, told)
-    foretold = not told.names or _foretold(search, whole.model if whole is not None else told)
-    if not foretold:
-        told, share, whole = search.bare, 0.0, beside.get(search.bare)
+    named, share = _named(search, best, kept)
+    whole = beside[named] if named in beside else _with_unexplained(search, named)
+    predicts = not named.names or _predicts(search, whole.model if whole is not None else named)
+    if not predicts:
+        named, share, whole = search.bare, 0.0, beside.get(search.bare)
 
     return Decision(
         "explained" if named.names else "unlisted",
@@ -134,7 +134,7 @@ def judged(
         tuple(
             Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
             for name in best.names
-            if name not in told.names and _likely(best.share * _weight(every, best))
+            if name not in named.names and _likely(best.share * _weight(every, best))
         ),
     )
 
@@ -144,11 +144,11 @@ def _likely(probability: float) -> bool:
     return probability > 1.0 - probability
 
 
-def _with_unexplained(search: EffectSearch, model: Model) -> Nameless | None:
+def _with_unexplained(search: EffectSearch, model: Model) -> UnexplainedTerms | None:
     return attempted(lambda: unexplained_with(search.screening, model))
 
 
-def _foretold(search: EffectSearch, whole: Model) -> bool:
+def _predicts(search: EffectSearch, whole: Model) -> bool:
     """Whether a model misses less than the discrepancy of form alone of runs that were held out."""
     return missed(search.problem, whole.fitted) < missed(search.problem, search.bare.fitted)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.random_effect import even, freedom
+from gritd.tools.diagnose.fit.random_effect import even, random_effect
 from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screening import Screening
@@ -50,7 +50,9 @@ def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> 
     """With functions of a size that the recordings tell."""
     problem, fitted = screening.problem, model.fitted
     columns = np.column_stack([s.columns for s in chosen])
-    functions = freedom("unexplained", columns, problem.noise, even(TUNING.fit.strength_sizes))
+    functions = random_effect(
+        "unexplained", columns, problem.noise, even(TUNING.fit.strength_sizes)
+    )
 
     return fit_model(
         problem,

@@ -154,9 +154,9 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
 def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     patch = make("soil_patch", {"friction_change": -0.2, "centre": 0.2, "length": 0.2})
     search = searched(patch)
-    promise = next(p for p in _promises(search, search.bare, 1) if p.effect == "soil_patch")
-    assert 1 < len(promise.starts) <= TUNING.search.again
-    assert len({tuple(one.start) for one in promise.starts}) == len(promise.starts)
-    best = _with_effect(search, promise).evidence
-    alone = [_with_effect(search, replace(promise, starts=(one,))) for one in promise.starts]
+    predicted = next(p for p in _gains(search, search.bare, 1) if p.effect == "soil_patch")
+    assert 1 < len(predicted.starts) <= TUNING.search.again
+    assert len({tuple(one.start) for one in predicted.starts}) == len(predicted.starts)
+    best = _with_effect(search, predicted).evidence
+    alone = [_with_effect(search, replace(predicted, starts=(one,))) for one in predicted.starts]
     assert best >= max(model.evidence for model in alone) - 1e-6

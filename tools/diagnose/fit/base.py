@@ -39,12 +39,15 @@ class BaseFit:
 
 
 def fit_roughly(stack: Stack) -> BaseFit:
-    """In white noise, to linearise about."""
+    """In white noise, to linearise about: a few steps, since a fit that converged would have bent
+    soil and calibration to whatever the equations miss.
+    """
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
 
     problem = Problem(stack, noise, allowed(stack))
-    return BaseFit(problem, Model(problem.descend((), (), start, np.zeros(0))))
+    fitted = problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds)
+    return BaseFit(problem, Model(fitted))
 
 
 def explainable(rough: BaseFit) -> Explainable:

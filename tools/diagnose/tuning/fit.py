@@ -24,6 +24,8 @@ class FitTuning:
         5e-4, "-", "of a channel's size: integration rules and idealised servos are off by it"
     )
 
+    rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
+
     # --- form_error.py: how far published forms of an effect differ ---
     form_error_sizes: tuple[float, ...] = tuned(
         (0.0, 0.05, 0.15, 0.4), "-", "shares of an effect", FORMS

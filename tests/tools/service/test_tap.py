@@ -103,7 +103,7 @@ def test_what_cannot_be_played_or_kept_is_one_line(tmp_path):
     for arguments, said in (
         (("--from-tap", tmp_path / "none"), "none/encoders.wire: No such file or directory"),
         (("--from-tap", tmp_path / "none", "--fast"), "encoders.wire: No such file or directory"),
-        (("--tap", config), f"{config}: File exists"),
+        (("--tap", config), f"{config}: file exists"),
         (("--fast",), "argument --fast: only with --from-tap"),
         (("--tap", "a", "--from-tap", "b"), "argument --from-tap: not allowed with argument --tap"),
     ):

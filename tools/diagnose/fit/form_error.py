@@ -41,7 +41,7 @@ from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import DEPENDENT, SQUARE
+from gritd.tools.diagnose.tuning.guards import DEPENDENT, SLIGHT, SQUARE
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
 NOWHERE = ("drivetrain",)  # stages that know of no place on the bed
@@ -235,8 +235,13 @@ def _beside(noise: Noise, columns: Array, fitted: Fitted, own: Index) -> Array:
 
 
 def _by_channel(stack: Stack, added: Array) -> Array:
-    """Marks (N, m) of the channels in which an effect acts; (N, 0) where it is but one."""
-    marks = [stack.of(c) for c in stack.rig.channels if np.any(added[stack.of(c)])]
+    """Marks (N, m) of the channels in which an effect acts, rounding apart; (N, 0) where it is but
+    one.
+    """
+    least = SLIGHT * np.abs(stack.measured)
+    marks = [
+        own for own in map(stack.of, stack.rig.channels) if np.any(np.abs(added) > least, where=own)
+    ]
     if len(marks) < 2:
         return np.zeros((stack.size, 0))
     return np.column_stack(marks).astype(float)

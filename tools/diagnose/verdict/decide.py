@@ -134,7 +134,7 @@ def judged(
         tuple(
             Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
             for name in best.names
-            if name not in named.names and _likely(best.share * _weight(every, best))
+            if name not in named.names and _likely(_weight(every, best))
         ),
     )
 

@@ -30,7 +30,7 @@ NUMBERS = (
     "noise.floor",
     "fit.strength_prior",
     "screen.level",
-    "search.promising",
+    "search.little",
     "verdict.together",
     "explain.slight_explanation",
 )

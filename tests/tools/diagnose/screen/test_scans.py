@@ -93,7 +93,6 @@ def begun(effect: type[Effect] | None, size: float) -> EffectSearch:
 def test_a_machine_next_door_is_heard_with_its_period() -> None:
     search = begun(NextDoor, 0.3)
     assert search.first.alarmed
-    assert search.first.largest == Shape("drawbar_pull", ("time",), "wave")
     place = locate(search.screening, search.base)[0]
     assert (place.channel, place.covariate) == ("drawbar_pull", "time")
     assert "oscillates with a period of 1.70 s, ± 0.30 N" in place.where

@@ -79,7 +79,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     """Its rivals are fitted, and it is reported which one failed."""
     bare = Model(cast(Any, None))
     every = [offered(bare, name, [0.0]) for name in ("coulomb_friction", "bulldozing")]
-    monkeypatch.setattr(searching, "_promises", lambda *_: every)
+    monkeypatch.setattr(searching, "_gains", lambda *_: every)
 
     def fitted(_: EffectSearch, predicted: Predicted) -> Model:
         if predicted.effect == "bulldozing":

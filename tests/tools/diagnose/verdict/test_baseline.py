@@ -71,8 +71,9 @@ def test_more_of_it_may_be_new_and_the_configuration_does_not_hold_it() -> None:
 
 def test_the_reference_alone_is_its_runs_and_a_campaign_without_one_has_none() -> None:
     both = pair()
-    alone = both.reference
-    assert alone is not None and alone.reference is None and all(alone.new)
+    assert both.reference is not None
+    alone = both.reference()
+    assert alone.reference is None and all(alone.new)
     for own, run in zip(alone.runs, both.runs[:3], strict=True):
         assert own.name == run.name
         for channel in alone.channels:

@@ -32,7 +32,6 @@ NUMBERS = (
     "screen.level",
     "search.little",
     "verdict.together",
-    "explain.slight_explanation",
 )
 
 
@@ -79,8 +78,8 @@ def test_a_fork_ends_as_a_diagnosis_from_the_beginning(
 def test_some_numbers_move_something_and_some_end_early(
     forked: dict[str, Any],
 ) -> None:
-    assert forked["rig.blur"] is not None
-    assert forked["orders.level"] is None
+    early = [name for name, outcome in forked.items() if outcome is None]
+    assert 0 < len(early) < len(forked)
 
 
 def test_the_numbers_are_as_they_were(forked: dict[str, Any]) -> None:

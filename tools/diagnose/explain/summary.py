@@ -128,7 +128,7 @@ def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
         if round(of.forms, 2) > 0.0
         else "and no more of it"
     )
-    if not of.foretells:
+    if not of.predicts:
         why = "but unseen runs are predicted worse with it"
     where = PLACE_OF[EFFECTS[of.name].stage]
     taken = f"takes {percent(of.share)} of the misfit, {why}: probably something else in {where}."

@@ -114,7 +114,7 @@ def descend(
                 here, unsure, failed = ground.linearised(unsure), None, False
                 continue
 
-            step = bounded_step(here, ground.bounds, _held(ground, here), damping)
+            step = bounded_step(here, ground.bounds, _held(here, ground.bounds), damping)
             tried, share, bent = None, 0.0, False
             if (expected := _gain(here, step)) > 0.0:  # bounds may cut a step into one that loses
                 tried, share, bent = _attempt(ground, here, step, expected, damping)
@@ -135,8 +135,8 @@ def descend(
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
 
 
-def _held(ground: Objective[Here, Tried], here: Here) -> Bools:
-    return ground.bounds.held(here.centre, here.gradient)
+def _held(here: DescentPoint, bounds: CoordinateBounds) -> Bools:
+    return bounds.held(here.centre, here.gradient)
 
 
 def _attempt(
@@ -151,15 +151,16 @@ def _attempt(
         return tried, share, share <= TUNING.fit.good
 
     there = ground.moved(here, tried)
-    follow = bounded_step(there, ground.bounds, ground.curved | _held(ground, there), damping)
+    follow = bounded_step(
+        there, ground.bounds, ground.curved | _held(there, ground.bounds), damping
+    )
     beside, lower = ground.tried(ground.bounds.clipped(there.centre + follow))
     return (beside, (here.nats - lower) / expected, True) if lower < nats else (tried, share, True)
 
 
 def _undamped_gain(here: DescentPoint, bounds: CoordinateBounds) -> float:
     """What the step without damping would gain by the linearised function [nats]."""
-    held = bounds.held(here.centre, here.gradient)
-    return _gain(here, bounded_step(here, bounds, held, DAMPING_LEAST))
+    return _gain(here, bounded_step(here, bounds, _held(here, bounds), DAMPING_LEAST))
 
 
 def _gain(here: DescentPoint, step: Array) -> float:

@@ -50,14 +50,14 @@ class WeighedExplanation:
 @dataclass(frozen=True)
 class Resembled:
     """An effect of the likeliest explanation that is not accepted; forms: the share by which ours
-    must be bent; share: of the misfit that the explanation takes; foretells: whether runs that were
+    must be bent; share: of the misfit that the explanation takes; predicts: whether runs that were
     held out are predicted better with it, where that is what it was judged by.
     """
 
     name: str
     share: float
     forms: float
-    foretells: bool = True
+    predicts: bool = True
 
 
 @dataclass(frozen=True)

@@ -212,9 +212,7 @@ def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[HeldOutTrial]) -> lis
 
 REASON_LOSS = """
 Motor torque alone does not tell a loss here. At one speed and one load, stronger soil, within what
-is known of it, and the discrepancy of form give the same torques at both slips: a loss in addition
-to what is named does not raise the evidence. What is named is that sinkage grows with slip, which
-it does.
+is known of it, and the discrepancy of form give the same torques at both slips.
 """
 
 DRIVETRAIN = Proof(
@@ -271,7 +269,7 @@ def _of_wall(diagnosis: DiagnosisRun, held: Sequence[HeldOutTrial]) -> list[Chec
 REASON_WALL = """
 At one load a drag on the wall, a tilted bed and crosstalk of the load are one constant force.
 Weaker soil, within what is known of it, and the discrepancy of form give the same pull at both
-slips: a wall in addition to what is named raises the evidence by less than 1 nat.
+slips.
 """
 
 SIDE_WALL = Proof(

@@ -18,12 +18,12 @@ help: ## list the targets
 venv: $(READY) ## set up .venv (the other targets do it when they need it)
 
 # --upgrade makes a venv that an older Python or an interrupted set-up left behind whole again.
-$(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
+$(READY): pyproject.toml setup.py $(wildcard estimator/compiled/*.[ch])
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "gritd needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "setting up $(VENV) (a minute or two, once) …"
 	@$(PYTHON) -m venv --upgrade $(VENV) || { echo "cannot make a venv; is the package python3-venv installed?" >&2; exit 1; }
-	@rm -f estimator/compiled/*.cpython-*.so  # of versions before the limited API; Python would take them first
+	@rm -f estimator/compiled/*.so  # pip leaves them where it cannot compile
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[test]'
 	@ls estimator/compiled/*.so >/dev/null 2>&1 || \
 	  echo "nothing was compiled, and a tick takes longer; for Debian's Python: apt install gcc python3-dev; rm $@" >&2
@@ -65,7 +65,7 @@ man: $(READY) ## build/man: gritd(1), and gritd-COMMAND(1) for each command
 	@$(BIN)/python -m gritd.tools.dev.manual build/man
 
 site: $(READY) ## build/site: the documents as a site, to open from the folder; its examples run, some minutes
-	@rm -f estimator/compiled/*.cpython-*.so  # of versions before the limited API; Python would take them first
+	@rm -f estimator/compiled/*.so  # pip leaves them where it cannot compile
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[docs]'
 	@rm -rf build/pages build/site && mkdir -p build/pages
 	@cp -r docs .github config drivers estimator tools *.md build/pages  # links of docs/ lead to the others

@@ -19,7 +19,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ("gritd", "estimator", "drivers", "config", "tools")
-PAGES = ("pyproject.toml", "README.md", "LICENSE")
+PAGES = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 OF_THE_CHECKOUT = {  # scripts and what they install
     "gritd/config/release.lock",
     "gritd/config/requirements.lock",

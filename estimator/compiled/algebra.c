@@ -5,6 +5,7 @@
    sum is reordered and no product fused with a sum (-ffp-contract=off). A test compares the two on
    drawn values. */
 
+#include "sources.h"
 #include "tuples.h"
 #include <math.h>
 
@@ -202,4 +203,4 @@ static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "algebra", "The filter's algebra, compiled.", -1, methods, NULL,
     NULL, NULL, NULL};
 
-PyMODINIT_FUNC PyInit_algebra(void) { return PyModule_Create(&module); }
+PyMODINIT_FUNC PyInit_algebra(void) { return made_of_these_sources(&module); }

@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 try:
-    from gritd.estimator.compiled import algebra
+    from gritd.estimator.compiled import algebra, check_sources, closed, record
+
+    check_sources(algebra, closed, record)
     from gritd.estimator.compiled.algebra import dot, mixed, update, variance
     from gritd.estimator.compiled.closed import Closed
     from gritd.estimator.compiled.record import evidence
-except ImportError:  # no compiler where gritd was installed
+except ImportError:  # no compiler where gritd was installed, or what an older version left
     BUILT = False
 else:
     BUILT = True
@@ -34,8 +36,8 @@ __all__ = [
 
 # what a user reads where it was not
 IN_PYTHON = (
-    "in Python, a tick takes three times as long: there was no compiler when gritd was installed; "
-    "expected its wheel, or gcc and another installation"
+    "in Python, a tick takes three times as long: the C of this version was not compiled; "
+    "expected gritd's wheel, or gcc and another installation"
 )
 
 # the one `sum` of estimator: integers, which no order and no version of Python adds otherwise

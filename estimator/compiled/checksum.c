@@ -5,8 +5,7 @@
    Intel 2009: 64 bytes at a time are folded into the next 64; the bit-reflected constants are those
    of its last page. */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "sources.h"
 #include <stdint.h>
 
 #if !defined(__x86_64__)
@@ -86,5 +85,5 @@ PyMODINIT_FUNC PyInit_checksum(void) {
         PyErr_SetString(PyExc_ImportError, "this processor has no PCLMULQDQ");
         return NULL;
     }
-    return PyModule_Create(&module);
+    return made_of_these_sources(&module);
 }

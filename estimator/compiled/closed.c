@@ -6,8 +6,7 @@
    does. No sum is reordered and no product fused with a sum (-ffp-contract=off). A test compares
    the two on drawn values. */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "sources.h"
 #include <math.h>
 #include <string.h>
 
@@ -434,7 +433,7 @@ static PyType_Spec closed = {
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "closed", .m_size = -1};
 
 PyMODINIT_FUNC PyInit_closed(void) {
-    PyObject *made = PyModule_Create(&module), *type = PyType_FromSpec(&closed);
+    PyObject *made = made_of_these_sources(&module), *type = PyType_FromSpec(&closed);
     if (made == NULL || type == NULL || PyModule_AddObjectRef(made, "Closed", type) < 0)
         Py_CLEAR(made);
     Py_XDECREF(type);

@@ -2,8 +2,7 @@
    tools/diagnose/noise/colour.py finds them, operation for operation: the same bits
    (-ffp-contract=off). One colour at a time, so that its state stays in the nearest cache. */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "sources.h"
 
 enum { COLUMNS, KEPT, GAIN, SCALE, SLOW, FAST, OUT, ARRAYS };
 
@@ -73,4 +72,4 @@ static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "innovations", "Innovations under coloured noise.", -1, methods, NULL,
     NULL, NULL, NULL};
 
-PyMODINIT_FUNC PyInit_innovations(void) { return PyModule_Create(&module); }
+PyMODINIT_FUNC PyInit_innovations(void) { return made_of_these_sources(&module); }

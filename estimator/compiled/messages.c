@@ -2,8 +2,7 @@
    blocks: found and held against the sizes of their channels, as recording/piles.py does by the
    message index, and copied into rows, as recording/tables.py does. */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "sources.h"
 #include <stdint.h>
 #include <string.h>
 
@@ -310,4 +309,4 @@ static PyMethodDef methods[] = {
 static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "messages", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
-PyMODINIT_FUNC PyInit_messages(void) { return PyModule_Create(&module); }
+PyMODINIT_FUNC PyInit_messages(void) { return made_of_these_sources(&module); }

@@ -1,6 +1,7 @@
 /* Whether the soil changed: the Bayes factors of filter/evidence.py, operation for operation, to
    the same bits. */
 
+#include "sources.h"
 #include "tuples.h"
 #include <math.h>
 
@@ -255,4 +256,4 @@ static struct PyModuleDef module = {
     PyModuleDef_HEAD_INIT, "record", "Whether the soil changed, compiled.", -1, methods, NULL,
     NULL, NULL, NULL};
 
-PyMODINIT_FUNC PyInit_record(void) { return PyModule_Create(&module); }
+PyMODINIT_FUNC PyInit_record(void) { return made_of_these_sources(&module); }

@@ -7,11 +7,19 @@ reads the same files by both. `crc32` is that of zlib.
 
 from __future__ import annotations
 
+from gritd.estimator.compiled import check_sources
+
 try:
+    from gritd.estimator.compiled import checksum
+
+    check_sources(checksum)
     from gritd.estimator.compiled.checksum import crc32
 except ImportError:  # no compiler, or a processor that zlib knows better
     from zlib import crc32
 try:
+    from gritd.estimator.compiled import messages
+
+    check_sources(messages)
     from gritd.estimator.compiled.messages import chunks, fill, walk
 except ImportError:  # no compiler where gritd was installed
     BUILT = False

@@ -4,7 +4,12 @@ stands in tools/diagnose/noise/colour.py. A test compares them.
 
 from __future__ import annotations
 
+from gritd.estimator.compiled import check_sources
+
 try:
+    from gritd.estimator.compiled import innovations
+
+    check_sources(innovations)
     from gritd.estimator.compiled.innovations import fill
 except ImportError:  # no compiler where gritd was installed
     BUILT = False

@@ -4,14 +4,18 @@ of them computed it.
 
 from __future__ import annotations
 
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
 from math import nan
+from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import numpy as np
 import pytest
 
+from gritd.estimator import compiled
 from gritd.estimator.compiled import arithmetic
 from gritd.estimator.filter import estimate as algebra
 from gritd.estimator.filter.estimate import STATES, Update, made, rows
@@ -197,6 +201,19 @@ def test_what_is_no_vector_is_refused(arguments):
 def test_a_table_of_another_size_is_refused():
     with pytest.raises(ValueError, match="10 x 14 x 120"):
         arithmetic.Closed(tuple, (0.1, 0.1, 0.5, 0.0), 0.0, (0.0, 1.0), (0.0, 1.0), b"12345678")
+
+
+@pytest.mark.parametrize("change, used", [("", True), ("\n/* of the next version */\n", False)])
+def test_what_an_older_version_left_is_not_used(change, used, tmp_path, monkeypatch):
+    """The modules stay where the next version is installed without a compiler."""
+    folder = Path(compiled.__file__).parent
+    copytree(folder, tmp_path / "compiled", ignore=ignore_patterns("*.so"))
+    with open(tmp_path / "compiled" / "tuples.h", "a", encoding="utf-8") as file:
+        file.write(change)
+    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled" / "__init__.py"))
+
+    for wrapper in ("arithmetic.py", "records.py", "whitening.py"):
+        assert runpy.run_path(str(folder / wrapper))["BUILT"] is used
 
 
 DENIED = """

@@ -64,12 +64,6 @@ def test_the_import_keeps_who_and_what(day: tuple[Path, dict[str, str]]) -> None
 
 
 @pytest.mark.slow
-def test_the_estimate_says_which_runs_are_not_believed(day: tuple[Path, dict[str, str]]) -> None:
-    (said,) = of(day[1], "gritd estimate")
-    assert "not sure of c and tan φ: " in said and "not used: " in said
-
-
-@pytest.mark.slow
 def test_the_diagnosis_names_a_friction_of_the_drive(day: tuple[Path, dict[str, str]]) -> None:
     (said,) = of(day[1], "gritd diagnose")
     assert said.startswith("verdict: explained")

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -24,13 +22,19 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_lead_somewhere(page: Path) -> None:
-    text = CODE.sub("", page.read_text(encoding="utf-8"))
-    for target in LINK.findall(text):
-        if target.startswith(ELSEWHERE):
-            continue
-        path, _, anchor = target.partition("#")
-        found = (page.parent / path).resolve() if path else page
-        assert found.exists(), f"{target}: no such file"
-        assert not anchor or found.suffix != ".md" or anchor in anchors(found), target
+def leads_somewhere(page: Path, target: str) -> bool:
+    if target.startswith(ELSEWHERE):
+        return True
+    path, _, anchor = target.partition("#")
+    found = (page.parent / path).resolve() if path else page
+    return found.exists() and (not anchor or found.suffix != ".md" or anchor in anchors(found))
+
+
+def test_links_lead_somewhere() -> None:
+    links = [
+        (page, target)
+        for page in PAGES
+        for target in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8")))
+    ]
+    assert len(links) > 100
+    assert [link for link in links if not leads_somewhere(*link)] == []

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
+from gritd.config import packaged
 from gritd.estimator.daemon.feed import Feed
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.estimator.recording.salvage import read
 from gritd.tools.commands import monitor, replay_report
 from gritd.tools.commands.status import summary
 from gritd.tools.service.incidents import OVER, PAUSE, Recurring
 from tests.estimator.daemon.reports import REPORT
-from tests.wording.rig import output
+from tests.wording.commands import simulated
+from tests.wording.rig import output, said
 
 PULL = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
 LOOK = 0.1  # [s]
@@ -45,6 +52,34 @@ def replay_of_no_estimate(folder: Path) -> Iterator[str]:
         rows["status"] = Status.MISMATCH if flags else Status.TRACKING
         rows["stamp"] = rows["evaluated"] = 1e9 * np.arange(3)
         yield replay_report.report(Path("run.mcap"), rows, "ticks")
+
+
+def thinned(run: Path, path: Path, kept: Mapping[str, slice]) -> None:
+    """Of these channels of a recording the readings of a slice, in the packaged configuration."""
+    recording = read(run)
+    writer = RunWriter(path, (), packaged().read_text(encoding="utf-8"), RunInfo())
+    for channel, part in kept.items():
+        rows = recording.arrays(f"/raw/{channel}")[part]
+        values = rows[rows.dtype.names[-1]]
+        for stamp, value in zip(rows["stamp"].tolist(), values.tolist(), strict=True):
+            writer.reading(Reading(stamp, channel, value, stamp))
+    writer.close()
+
+
+@output
+def replay_without_a_window(folder: Path) -> Iterator[str]:
+    """Readings out of their range, a moment, channels that are too slow or absent."""
+    list(simulated(folder, 60.0))
+    shutil.copy(packaged("testbed.dbc"), folder)
+    text = packaged().read_text(encoding="utf-8")
+    narrow = text.replace("range: [0.1 V, 4.9 V]", "range: [4.8 V, 4.9 V]", 1)
+    (folder / "narrow.yaml").write_text(narrow, encoding="utf-8")
+    yield from said(folder, "replay", "run-60.mcap", "--config", "narrow.yaml")
+
+    slow = {"wheel_encoder": slice(None, None, 25), "sinkage_pot": slice(None)}
+    for name, kept in {"moment": {"sinkage_pot": slice(4)}, "slow": slow}.items():
+        thinned(folder / "run-60.mcap", folder / f"{name}.mcap", kept)
+        yield from said(folder, "replay", f"{name}.mcap")
 
 
 def journal(*stretches: tuple[float, Status, int, int]) -> Iterator[str]:

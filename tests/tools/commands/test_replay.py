@@ -12,7 +12,6 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config.configuration import load, loads, with_engine
-from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording import metadata, run_writer
@@ -303,55 +302,6 @@ def test_missing_is_usage_and_no_recording_is_damage_wherever_it_stands(recorded
             assert cli.main(["replay", *map(str, files), "--engine", "plain"]) == code
             said = capsys.readouterr().err
             assert said.startswith(f"gritd: {tmp_path / name}") and said.count("\n") == 1
-
-
-def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, configuration):
-    other = configuration.text.replace("range: [0.1 V, 4.9 V]", "range: [4.8 V, 4.9 V]", 1)
-    (tmp_path / "other.yaml").write_text(other, encoding="utf-8")
-
-    for output in ([], ["-o", str(tmp_path / "out.mcap")]):
-        assert (
-            cli.main(["replay", str(recorded), "--config", str(tmp_path / "other.yaml"), *output])
-            == 0
-        )
-        said = capsys.readouterr()
-        count = read(recorded).counts["/raw/sinkage_pot"]
-        assert "STARTING 100%" in said.out
-        reason = f"{count} of {count} readings of sinkage_pot are invalid, outside 4.8 … 4.9 V"
-        assert said.err == f"{recorded}: never ready: {reason}\n"
-
-
-def test_a_recording_of_a_moment_is_said_to_be_too_short(tmp_path, capsys, configuration):
-    writer = RunWriter(tmp_path / "moment.mcap", (), configuration.text, RunInfo())
-    for n in range(4):
-        stamp = 1_700_000_000_000_000_000 + n * 4_000_000
-        writer.reading(Reading(stamp, "sinkage_pot", 1.0, stamp))
-    writer.close()
-    assert cli.main(["replay", str(tmp_path / "moment.mcap")]) == 0
-    said = capsys.readouterr().err
-    assert "sinkage_pot has 4 readings, too few for a window of 100 ms" in said
-    assert "invalid" not in said
-
-
-def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, configuration):
-    writer = RunWriter(tmp_path / "slow.mcap", (), configuration.text, RunInfo())
-    recording, kept = read(recorded), {"wheel_encoder": 25, "carriage_encoder": 1, "sinkage_pot": 1}
-
-    for channel, step in kept.items():
-        rows = recording.arrays(f"/raw/{channel}")[::step]
-        for stamp, value in zip(
-            rows["stamp"].tolist(), rows[rows.dtype.names[-1]].tolist(), strict=True
-        ):
-            writer.reading(Reading(stamp, channel, value, stamp))
-
-    writer.close()
-    assert cli.main(["replay", str(tmp_path / "slow.mcap"), "--engine", "plain"]) == 0
-
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert (
-        "wheel_encoder has 60 readings, never three over half a window of 100 ms; "
-        "motor_shunt has no readings" in said
-    )
 
 
 def test_a_folder_is_no_recording_however_it_is_named(tmp_path, capsys, monkeypatch):

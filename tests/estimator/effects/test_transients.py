@@ -146,9 +146,11 @@ def test_runs_in_one_array_do_not_touch(name: str) -> None:
     motions = [replace(m, load=np.asarray(m.load)) for m in campaign(2, reversing=True)]
     effect, channels = typical(EFFECTS[name]), ("torque", "sinkage", "drawbar_pull", "load")
     ones = np.ones(sum(np.size(m.time) for m in motions))
-    together = Campaign(motions, settings, channels).readings(SOIL, ones, 1.0, (effect,))
+    together = Campaign(motions, settings, channels, SOIL).readings(SOIL, ones, 1.0, (effect,))
     apart = [
-        Campaign([m], settings, channels).readings(SOIL, np.ones(np.size(m.time)), 1.0, (effect,))
+        Campaign([m], settings, channels, SOIL).readings(
+            SOIL, np.ones(np.size(m.time)), 1.0, (effect,)
+        )
         for m in motions
     ]
     np.testing.assert_allclose(together, np.hstack(apart), rtol=1e-8, atol=1e-9)
@@ -162,12 +164,12 @@ def test_readings_do_not_depend_on_what_was_read_before(name: str) -> None:
     motions = [replace(m, load=np.asarray(m.load)) for m in campaign(2, reversing=True)]
     channels = ("torque", "sinkage", "drawbar_pull", "load")
     ones = np.ones(sum(np.size(m.time) for m in motions))
-    whole = Campaign(motions, settings, channels)
+    whole = Campaign(motions, settings, channels, SOIL)
     for before in ((), (typical(EFFECTS["slip_sinkage"]),), (typical(EFFECTS["sensor_drift"]),)):
         whole.readings(SOIL, ones, 1.0, before)
 
     effects = (typical(EFFECTS[name]),)
-    fresh = Campaign(motions, settings, channels).readings(SOIL, ones, 1.0, effects)
+    fresh = Campaign(motions, settings, channels, SOIL).readings(SOIL, ones, 1.0, effects)
     found = whole.readings(SOIL, ones, 1.0, effects)
     np.testing.assert_allclose(found, fresh, rtol=1e-8, atol=1e-9)
 

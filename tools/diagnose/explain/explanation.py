@@ -115,11 +115,10 @@ def _located(search: EffectSearch, accepted: Model, before: HeldOut) -> tuple[Lo
     """
     if not search.first.alarmed:
         return ()
-    with search.problem.stack.rig.aside():  # it may be done meanwhile
-        if not accepted.names:
-            return locate(search.screening, search.base, before.predicted)
-        held = unmoved(search.screening, accepted)
-        return locate(search.screening, held, held.fitted.predicted)
+    if not accepted.names:
+        return locate(search.screening, search.base, before.predicted)
+    held = unmoved(search.screening, accepted)
+    return locate(search.screening, held, held.fitted.predicted)
 
 
 def _hypotheses(

@@ -217,8 +217,7 @@ def with_forms_had(problem: Problem, model: Model) -> Model:
     """
     if model.marginal is None:
         return model
-    with problem.stack.rig.aside():
-        had = baseline_terms(problem.stack, problem.noise, model.fitted)
+    had = baseline_terms(problem.stack, problem.noise, model.fitted)
     chosen = (*model.chosen, *(0 for _ in had))
     return replace(model, marginal=model.marginal.beside(had), chosen=chosen) if had else model
 

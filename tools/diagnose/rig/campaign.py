@@ -4,10 +4,10 @@ itself.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,41 +21,54 @@ from gritd.estimator.stages.situation import Motion, Sensed
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.tuning import TUNING
 
+T = TypeVar("T")
+
 
 class Campaign:
-    """The motions of all runs one after the other (N,); `parts` says where each run lies."""
+    """The motions of all runs one after the other (N,); `parts` says where each run lies.
+
+    A balance starts at that of the soil and effects which the campaign is made with: what it is
+    read as follows from what is asked alone.
+    """
 
     def __init__(
-        self, motions: Sequence[Motion], settings: Settings, channels: Sequence[str]
+        self,
+        motions: Sequence[Motion],
+        settings: Settings,
+        channels: Sequence[str],
+        soil: Soil,
+        effects: Sequence[Effect] = (),
     ) -> None:
         self._settings, self._channels = settings, tuple(channels)
         self._motions = [_filled(motion) for motion in motions]
 
         self.parts = parts_of(self._motions)
         self._joined = _joined(self._motions)
-        self._carried: dict[Hashable, Carried] = {}  # the last few
-        self._last: Balance | None = None  # the next balance starts there
-
-    @contextmanager
-    def aside(self) -> Iterator[None]:
-        """See interface.Rig."""
-        carried, last = dict(self._carried), self._last
-        try:
-            yield
-        finally:
-            self._carried, self._last = carried, last
+        self._carried: dict[Hashable, Carried] = {}
+        self._readings: dict[Hashable, Array] = {}
+        self._begins: Balance | None = None
+        if all(_at_once(effect) for effect in effects):
+            self._begins = self._balanced(soil, self._joined, effects, None).balance
 
     def readings(
         self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
     ) -> Array:
         """True readings (channels, N); weights (N,) and travel are factors on the motions'."""
-        if all(_at_once(e) for e in effects):
+        key = (soil, weights.tobytes(), travelled, tuple(effects))
+        return _recent(
+            self._readings, key, lambda: self._read_anew(soil, weights, travelled, effects)
+        )
+
+    def _read_anew(
+        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
+    ) -> Array:
+        if all(_at_once(effect) for effect in effects):
             return self._read(self._solved(soil, weights, travelled, effects), effects)
 
         read = []
         for motion, part in zip(self._motions, self.parts, strict=True):
             scaled = _scaled(motion, weights[part], travelled)
-            near = None if self._last is None else part_of(self._last, part)
+            near = self._begins and part_of(self._begins, part)
             read.append(self._read(self._balanced(soil, scaled, effects, near), effects))
         return np.hstack(read)
 
@@ -64,16 +77,12 @@ class Campaign:
     ) -> Carried:
         """What the soil carries in all runs; solved anew only where something bears on it."""
         bearing = tuple(effect for effect in effects if effect.bears_on_soil())
-        key = (soil, weights.tobytes(), travelled, bearing)
-        if key not in self._carried:
-            if len(self._carried) >= TUNING.rig.kept:
-                self._carried.pop(next(iter(self._carried)))
-            motion = _scaled(self._joined, weights, travelled)
-            self._carried[key] = self._balanced(soil, motion, bearing, self._last)
-
-        solved = self._carried[key] = self._carried.pop(key)  # the last to go
-        self._last = solved.balance
-        return solved
+        motion = _scaled(self._joined, weights, travelled)
+        return _recent(
+            self._carried,
+            (soil, weights.tobytes(), travelled, bearing),
+            lambda: self._balanced(soil, motion, bearing, self._begins),
+        )
 
     def _balanced(
         self, soil: Soil, motion: Motion, effects: Sequence[Effect], near: Balance | None
@@ -86,6 +95,14 @@ class Campaign:
         constant = self._settings.drive.torque_constant.value
         sensed = responded(solved, effects, torque_constant=constant).sensed
         return np.stack([sensed_as(sensed, c, self._settings) for c in self._channels])
+
+
+def _recent(kept: dict[Hashable, T], key: Hashable, make: Callable[[], T]) -> T:
+    """The value of a key, made where it is not among the last few."""
+    if key not in kept and len(kept) >= TUNING.rig.kept:
+        kept.pop(next(iter(kept)))
+    kept[key] = value = kept.pop(key) if key in kept else make()
+    return value
 
 
 def parts_of(motions: Sequence[Motion]) -> list[slice]:

@@ -8,7 +8,6 @@ without soil. The other rooms work on the arrays defined here and know a rig by 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -209,8 +208,6 @@ class Rig:
     units:      of channels and covariates.
     effects:    the candidates.
     new:        of each run, whether candidates act; in all where there is no reference.
-    aside:      what is predicted inside leaves no trace: predictions begin at earlier ones, so
-        their last digits depend on what was predicted before.
     foresee:    every channel under an experiment of the menu.
     having:     the rig with effects in both campaigns, whose parameters are constants. A candidate
         of the same name is what is new of it.
@@ -246,7 +243,6 @@ class Rig:
     words: RigWords
     smooth: tuple[tuple[str, ...], ...]
     heated: tuple[str, ...]
-    aside: Callable[[], AbstractContextManager[None]] = nullcontext
     foresee: Callable[[str, Array, Sequence[Effect]], Foreseen] = _nothing_foreseen
     having: Callable[[Sequence[ConfiguredEffect]], Rig] | None = None
     reference: Callable[[], Rig] | None = None

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +21,6 @@ from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 
 SOIL = ("c", "tan_phi", "k", "n", "K")
-PHYSICS = (*SOIL, "weights", "carriage_scale")  # constants that need the forward model
 
 
 @dataclass(frozen=True)
@@ -39,6 +37,10 @@ class Driven:
     steps: Sequence[float]
     new: Sequence[bool]
     sets: WeightSets
+
+    def motions_of(self, new: bool) -> list[Motion]:
+        """Those of the new campaign, or of the reference."""
+        return [motion for motion, n in zip(self.motions, self.new, strict=True) if n == new]
 
     def set_of(self, new: bool) -> Index:
         """The set of weights of each value (n,) of the new campaign, or of the reference."""
@@ -69,8 +71,13 @@ class Prediction:
         self._means = None if means is None else [np.array([m[c] for c in channels]) for m in means]
         self._driven, self._prepared = driven, prepared
         self._less_axle = None if idle is None else ~np.concatenate(idle)
-        self._campaigns = _campaigns(driven, settings, channels)
-        self._true_readings: dict[tuple[object, ...], Array] = {}  # the last few
+
+        prior = {constant.name: constant.value for constant in constants}
+        begins = self._soil(prior, False), self._baseline(prior)
+        self._campaigns = [
+            (new, Campaign(driven.motions_of(new), settings, channels, *begins))
+            for new in sorted(set(driven.new))  # the reference first, where there is one
+        ]
 
         self._parts = parts_of(driven.motions)
         sizes = [part.stop - part.start for part in self._parts]
@@ -80,18 +87,6 @@ class Prediction:
         for part in self._parts:
             self._inner[[part.start, part.stop - 1]] = False
 
-    @contextmanager
-    def aside(self) -> Iterator[None]:
-        """See interface.Rig."""
-        readings = dict(self._true_readings)
-        with ExitStack() as campaigns:
-            for _, campaign in self._campaigns:
-                campaigns.enter_context(campaign.aside())
-            try:
-                yield
-            finally:
-                self._true_readings = readings
-
     def channels(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
@@ -99,10 +94,12 @@ class Prediction:
         value = self._values(u)
         baseline = self._baseline(value)
 
-        true = []
+        true = []  # readings (channels, n) of each campaign before scale, offset and delay
         for new, campaign in self._campaigns:
             acting = (*baseline, *effects) if new or everywhere else baseline
-            true.append(self._true(value, acting, new, campaign))
+            weights = 1.0 + value["weights"] + self._own_weights(value)[self._driven.set_of(new)]
+            travelled = 1.0 + value["carriage_scale"]
+            true.append(campaign.readings(self._soil(value, new), weights, travelled, acting))
 
         read = self._read(np.hstack(true), value)
         if self._means is not None:
@@ -140,27 +137,11 @@ class Prediction:
             for e in self._settings.effects
         )
 
-    def _true(
-        self,
-        value: Mapping[str, float],
-        effects: tuple[Effect, ...],
-        new: bool,
-        campaign: Campaign,
-    ) -> Array:
-        """True readings (channels, n) of one campaign before scale, offset and delay."""
-        # the last for values without a set of weights of their own
-        own = (*(value[name] for name in self._driven.sets.names), 0.0)
-        shifts = tuple(value[f"new_{name}"] if new else 0.0 for name in self._prepared)
-        physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
-
-        if physics not in self._true_readings:
-            if len(self._true_readings) >= TUNING.rig.kept:
-                self._true_readings.pop(next(iter(self._true_readings)))
-            weights = 1.0 + value["weights"] + np.array(own)[self._driven.set_of(new)]
-            self._true_readings[physics] = campaign.readings(
-                self._soil(value, new), weights, 1.0 + value["carriage_scale"], effects
-            )
-        return self._true_readings[physics]
+    def _own_weights(self, value: Mapping[str, float]) -> Array:
+        """Relative error of each set of weights for itself (m + 1,), the last of values without
+        one.
+        """
+        return np.array([*(value[name] for name in self._driven.sets.names), 0.0])
 
     def _soil(self, value: Mapping[str, float], new: bool) -> Soil:
         """The soil of one campaign: a bed that was prepared anew has its own."""
@@ -190,14 +171,3 @@ class Prediction:
         out = np.array(read)
         out[motor] -= np.where(where, read[axle], 0.0)
         return out
-
-
-def _campaigns(
-    driven: Driven, settings: Settings, channels: Sequence[str]
-) -> list[tuple[bool, Campaign]]:
-    """The reference first, where there is one; whether each is the new one."""
-    campaigns = []
-    for new in sorted(set(driven.new)):
-        motions = [m for m, n in zip(driven.motions, driven.new, strict=True) if n == new]
-        campaigns.append((new, Campaign(motions, settings, channels)))
-    return campaigns

@@ -157,7 +157,6 @@ def wheel_rig(
         words=_words(data, settings, runs, holding),
         smooth=SMOOTH,
         heated=("torque",),
-        aside=prediction.aside,
         foresee=prediction.foresee,
         having=again,
         reference=alone if reference else None,

@@ -87,11 +87,8 @@ def one_pass(problem: Problem, model: Model, jobs: int = 1) -> Pass:
     tried, gram = every_shape(problem, model), Gram(problem, model)
 
     def weighed(names: Sequence[str]) -> list[tuple[str, list[Weighed]]]:
-        with problem.stack.rig.aside():  # the same bits, whatever was tried before
-            made = [
-                (n, attempted(partial(_weighed, problem, model, gram, n, tried[n]))) for n in names
-            ]
-            return [(name, every) for name, every in made if every]
+        made = [(n, attempted(partial(_weighed, problem, model, gram, n, tried[n]))) for n in names]
+        return [(name, every) for name, every in made if every]
 
     parts = each(jobs, weighed, list(some_of(tried)))
     return Pass(gram.total, {name: every for part in parts for name, every in part})

@@ -79,11 +79,10 @@ def _of_effects(problem: Problem, model: Model, first: Pass, runs: Sequence[Bool
     for name, every in first.effects.items():
         shapes = [one.signature.fixed for one in every[: TUNING.search.again]]
         effect = stack.rig.effects[name]
-        with stack.rig.aside():  # the same bits, whatever was tried before
-            tried = [
-                signature(stack, fitted.u, fitted.predicted, effect, fixed, everywhere=True)
-                for fixed in shapes
-            ]
+        tried = [
+            signature(stack, fitted.u, fitted.predicted, effect, fixed, everywhere=True)
+            for fixed in shapes
+        ]
         made = [_in_runs(problem, gram, one, runs) for one in tried if one is not None]
         if made:
             each.append(log_sum(made) - np.log(len(made)))

@@ -184,8 +184,7 @@ def extended(
             wanted.setdefault(predicted.names, predicted)
 
     def fitted(predicted: Predicted) -> Model | None:
-        with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return attempted(lambda: _with_effect(search, predicted))
+        return attempted(lambda: _with_effect(search, predicted))
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
@@ -347,7 +346,6 @@ def _less(search: EffectSearch, model: Model, name: str) -> Model:
     free = tuple(f for f, stays in zip(fitted.free, still, strict=True) if stays)
     begins = (fitted.u, fitted.x[np.array(still, bool)])
     screening, errors = search.screening, model.other_forms.of(kept)
-    with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-        return fit_model(
-            screening.problem, screening.forms, types, free, begins, model.sizes, errors, fitted
-        )
+    return fit_model(
+        screening.problem, screening.forms, types, free, begins, model.sizes, errors, fitted
+    )

@@ -63,8 +63,7 @@ def _beside(
     """What has no name beside each of some models. tell: is given how many of how many are done."""
 
     def nameless(model: Model) -> UnexplainedTerms | None:
-        with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return _with_unexplained(search, model)
+        return _with_unexplained(search, model)
 
     made = each(jobs, nameless, models, shared(search), lambda done: tell(done, len(models)))
     return dict(zip(models, made, strict=True))

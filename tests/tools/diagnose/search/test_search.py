@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -51,11 +50,10 @@ def offered(model: Model, name: str, start: list[float], sizes: tuple[int, ...] 
 
 
 def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
-    """Also where another fit stood between: a prediction begins at the one before."""
+    """Also where another fit stood between."""
     search, found = searched(make("bulldozing", {"share": 0.75})), []
     for jobs in (1, 2):
-        with search.problem.stack.rig.aside():
-            found.append(extended(search, [search.bare], 3, jobs).models[2:])
+        found.append(extended(search, [search.bare], 3, jobs).models[2:])
 
     assert len(found[0]) == 3
     assert [m.evidence for m in found[0]] == [m.evidence for m in found[1]]
@@ -87,7 +85,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
         return replace(predicted.model, names=(predicted.effect,))
 
     monkeypatch.setattr(searching, "_with_effect", fitted)
-    rig = SimpleNamespace(aside=nullcontext, effects=dict.fromkeys(EFFECTS))
+    rig = SimpleNamespace(effects=dict.fromkeys(EFFECTS))
     problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), nuisance=SimpleNamespace(parts=()))
     screening: Any = SimpleNamespace(problem=problem, forms=())
     search = EffectSearch(screening, (bare, bare), cast(Any, None))

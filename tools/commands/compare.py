@@ -27,7 +27,6 @@ from gritd.tools.cli.command import (
 from gritd.tools.cli.files import writable
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
-from gritd.tools.diagnose.explain.provenance import check_rig
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
@@ -36,6 +35,7 @@ from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
+from gritd.tools.recordings.provenance import check_rig
 from gritd.tools.report import comparison
 from gritd.tools.report.comparison import Comparison
 

@@ -11,15 +11,13 @@ from typing import Any
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.metadata import versions
-from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.cli.parallel import meanwhile
-from gritd.tools.diagnose.explain import provenance
-from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_innovations
+from gritd.tools.diagnose.explain.innovations import with_innovations
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, in_order, read_all, read_one
+from gritd.tools.recordings import provenance
 from gritd.tools.report import reference as references
 
 
@@ -60,17 +58,11 @@ def of_files(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        soil = any(constant.soil for constant in rig.constants)
-        # long recordings are large: they are released, and read again where they are needed
-        reads = [partial(_same, recording) for recording in recordings]
-        work = partial(filtered, settings, reads, soil) if online else Filtered
-        del recordings, known, reads
-        with meanwhile(jobs, work) as before:
-            del work
-            diagnosis = diagnose(rig, seed, redo, step, jobs, quick)
-            if online:
-                again = [partial(read_one, path) for path in files]
-                diagnosis = with_innovations(diagnosis, configuration, before(), again, jobs)
+        del recordings, known  # long ones are large, and read again where they are needed
+        diagnosis = diagnose(rig, seed, redo, step, jobs, quick)
+        if online:
+            reads = [partial(read_one, path) for path in in_order(files)]
+            diagnosis = with_innovations(diagnosis, configuration, reads, jobs)
 
     if reference.files:
         diagnosis = references.with_reference(diagnosis, reference)
@@ -94,7 +86,3 @@ def _redo(
         **({"quick": True} if quick else {}),
         "configuration": configuration.text,
     }
-
-
-def _same(recording: Recording) -> Recording:
-    return recording

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from gritd.estimator.visible import visible
@@ -19,6 +20,7 @@ from gritd.tools.report.words import quantity, to_tell
 
 SHOWN = 4  # places and hypotheses
 DIGITS = 2  # of a probability
+NEARLY = 0.999  # nothing is surer
 NAMES = {"c": "c", "tan_phi": "tan φ"}
 
 
@@ -30,11 +32,12 @@ def text(diagnosis: Diagnosis) -> str:
         *(line for of in _shown(diagnosis) for line in _hypothesis(of, diagnosis)),
         *_had(diagnosis.reference),
     ]
-    if (law := diagnosis.law) is not None and law.parameters:
+    if (law := diagnosis.law) is not None:
         lines.append(f"  law: {law.expression} (takes {percent(law.share)} of the misfit)")
+    named = diagnosis.verdict == "explained"
     if diagnosis.soil is not None:
-        lines += _soil(diagnosis.soil)
-    lines += _fit(diagnosis.fit)
+        lines += _soil(diagnosis.soil, named)
+    lines += _fit(diagnosis.fit, named)
 
     if diagnosis.next_experiment is not None:
         following = diagnosis.next_experiment
@@ -44,7 +47,11 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _shown(diagnosis: Diagnosis) -> list[Hypothesis]:
-    """What is accepted, then what has a probability in the digits that are printed."""
+    """What is accepted, then what has a probability in the digits that are printed; of a campaign
+    in which nothing is amiss none.
+    """
+    if diagnosis.verdict in ("consistent", "insufficient"):
+        return []
     others = (of for of in diagnosis.hypotheses if not of.accepted)
     likely = [of for of in others if of.probability >= 0.5 * 10.0**-DIGITS]
     return [*diagnosis.accepted, *likely][:SHOWN]
@@ -54,14 +61,12 @@ def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> Iterator[str]:
     """Where names are accepted, the others are rivals; without any, they are no explanation. Of an
     accepted one its equation too.
     """
-    chance = f"probability {of.probability:.{DIGITS}f}"
     other = "rival" if diagnosis.accepted else "not accepted"
-    head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
-    head += f", form off by {percent(of.other_forms)}" if of.other_forms else ""
+    head = f"  {'accepted' if of.accepted else other}: {of.effect}"
+    head += f", probability {of.probability:.{DIGITS}f}"
+    head += f", form error {percent(of.other_forms)}" if of.other_forms else ""
     values = _listed(of.known)
-    others = of.indistinguishable_from
-    alike = f"; cannot be distinguished from {', '.join(others)}" if others else ""
-    yield f"{head}{f': {values}' if values else ''}{alike}"
+    yield f"{head}{f': {values}' if values else ''}"
     if of.accepted:
         yield from (f"    {line}" for line in of.equation.splitlines())
 
@@ -75,23 +80,23 @@ def _listed(parameters: Mapping[str, Quantity]) -> str:
     return ", ".join(f"{name} {quantity(q)}" for name, q in parameters.items())
 
 
-def _soil(soil: SoilFit) -> Iterator[str]:
+def _soil(soil: SoilFit, named: bool) -> Iterator[str]:
+    """named: whether an effect makes the difference between before and after."""
     for key, name in NAMES.items():
-        before, after = soil.before[key], soil.after[key]
-        yield f"  {name}: {quantity(before)} before, {quantity(after)} after"
+        before, after = quantity(soil.before[key]), quantity(soil.after[key])
+        yield f"  {name}: {before} before, {after} after" if named else f"  {name}: {after}"
     if strained := soil.strained():
         yield f"  {strained}"
 
 
-def _fit(fit: Fit) -> Iterator[str]:
+def _fit(fit: Fit, named: bool) -> Iterator[str]:
     for channel, inside in fit.unit.items():
         unit, factor = shown(inside)
         before, after = (number(of[channel] * factor) for of in (fit.before, fit.after))
         noise = number(fit.noise_floor[channel] * factor, 2)
-        yield (
-            f"  error of {spelled(channel)} on runs held out: {before} before, {after} after,"
-            f" noise {noise} {unit}".rstrip()
-        )
+        error = f"{before} before, {after} after" if named else before
+        where = f"error of {spelled(channel)} on unseen runs"
+        yield f"  {where}: {error}, noise {noise} {unit}".rstrip()
 
     if fit.innovation_before and fit.innovation_after:
         ratios = ", ".join(
@@ -104,7 +109,10 @@ def _fit(fit: Fit) -> Iterator[str]:
 
 
 def _foreseen(following: NextExperiment, verdict: str) -> str:
-    gain, ending = following.expected_gain_nats, ""
-    if following.separates:
-        ending = f": {to_tell(verdict, following.separates)}"
-    return f"{ending} (expected gain {gain:.0f} nats)" if gain >= 1.0 else ending
+    """What it would tell, and how sure one would be of what is true, of two as likely now."""
+    if not following.separates:
+        return ""
+    told = to_tell(verdict, following.separates)
+    sure = following.expected_probability
+    known = f" ({percent(min(sure, NEARLY))} sure)" if math.isfinite(sure) else ""
+    return f": {told}{known}"

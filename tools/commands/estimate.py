@@ -37,7 +37,7 @@ from gritd.tools.cli.command import (
     os_errors,
 )
 from gritd.tools.cli.progress import Progress
-from gritd.tools.diagnose.explain.provenance import check_rig
+from gritd.tools.recordings.provenance import check_rig
 
 REPEATABILITY = {"c": ("cohesion", "Pa"), "tan_phi": ("tan_phi", ""), "k": ("shear_modulus", "")}
 UNUSUAL = 16.27  # chi-square, 3 degrees of freedom: 0.1 % of runs of the same soil are beyond

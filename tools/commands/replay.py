@@ -46,7 +46,7 @@ from gritd.tools.commands.readiness import never_ready
 from gritd.tools.commands.replay_report import Rows, report
 from gritd.tools.commands.replay_run import announced_settings, rerun_of, run_settings, ticks_of
 from gritd.tools.commands.replay_verify import verify
-from gritd.tools.diagnose.explain.provenance import check_rig
+from gritd.tools.recordings.provenance import check_rig
 
 AT_ONCE = 10_000  # ticks; as Python's numbers they take several times their place in an array
 ROW = np.dtype([(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS])

@@ -17,9 +17,9 @@ from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.cli.progress import Progress
 from gritd.tools.commands import simulate
 from gritd.tools.commands.diagnose import _steps_of, main
-from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.method import OF_REFERENCE
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
+from gritd.tools.recordings import provenance
 from gritd.tools.report.reference import given
 
 SCHEDULE = "segments:\n  - {duration: 3 s, load: 60 N, slip: 0.2, speed: 20 mm/s}\n"

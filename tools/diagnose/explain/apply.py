@@ -42,7 +42,7 @@ def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> 
     _set_effects(document, diagnosis)
     if diagnosis.soil is not None and is_known(diagnosis):
         _set_soil(document, configuration.settings, _soil_of(diagnosis))
-        if diagnosis.learnt is not None and not _law_carries(diagnosis):
+        if diagnosis.learnt is not None and diagnosis.law is None:
             set_discrepancy(document, diagnosis.learnt, configuration.source)
     return f"{HEADER}{visible(diagnosis.summary)}\n{document.text()}"
 
@@ -55,12 +55,6 @@ def is_known(diagnosis: Diagnosis) -> bool:
     return diagnosis.verdict in KNOWN or beside
 
 
-def _law_carries(diagnosis: Diagnosis) -> bool:
-    """Whether a law is written: it foretells better than δ, or there is no δ."""
-    law = diagnosis.law
-    return law is not None and bool(law.parameters) and (law.carries or diagnosis.learnt is None)
-
-
 def _without_header(text: str) -> str:
     first, _, rest = text.partition("\n")
     return rest if first.startswith(HEADER) else text
@@ -70,7 +64,7 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
     parameters_of = _had(diagnosis)
     for h in diagnosis.accepted:
         parameters_of[h.effect] = _more(h.effect, parameters_of.get(h.effect, {}), h.parameters)
-    if diagnosis.law is not None and _law_carries(diagnosis):
+    if diagnosis.law is not None:
         parameters_of["empirical_law"] = diagnosis.law.parameters
 
     for effect, parameters in parameters_of.items():
@@ -118,8 +112,7 @@ def _stated(parameter: Parameter, found: Quantity) -> str:
 def _soil_of(diagnosis: Diagnosis) -> Mapping[str, Quantity]:
     """The soil that belongs to what is written beside it."""
     assert diagnosis.soil is not None
-    law = diagnosis.law
-    return law.soil if law is not None and _law_carries(diagnosis) else diagnosis.soil.after
+    return diagnosis.law.soil if diagnosis.law is not None else diagnosis.soil.after
 
 
 def _set_soil(document: EditedYaml, settings: Settings, soil: Mapping[str, Quantity]) -> None:

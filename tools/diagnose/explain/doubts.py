@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gritd.tools.cli.wording import fixed, shown, sigmas, spaced, spelled
+from gritd.tools.diagnose.explain.result import SOIL
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import Noise
-from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.interface import Constant, Rig
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -19,10 +20,17 @@ def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
 
 
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
-    """Constants far from what is known of them [σ], the farthest first."""
-    constants = [(c.name, float(u)) for c, u in zip(rig.constants, model.fitted.u, strict=True)]
-    far = [(name, u) for name, u in constants if abs(u) >= TUNING.explain.doubtful]
+    """Constants far from what is known of them [σ], in words, the farthest first."""
+    constants = zip(rig.constants, model.fitted.u.tolist(), strict=True)
+    far = [(_words(c), u) for c, u in constants if abs(u) >= TUNING.explain.doubtful]
     return sorted(far, key=lambda each: -abs(each[1]))
+
+
+def _words(constant: Constant) -> str:
+    """A constant; of a bed that was prepared anew, whose change it is."""
+    if constant.changes:
+        return f"{SOIL[constant.changes]} of the new bed"
+    return SOIL.get(constant.name, constant.name)
 
 
 def _strained(rig: Rig, model: Model) -> Iterator[str]:
@@ -34,7 +42,7 @@ def _bounded(rig: Rig, model: Model) -> Iterator[str]:
     fitted = model.fitted
     for constant, held in zip(rig.constants, fitted.held, strict=False):
         if held:
-            yield f"At its bound: {constant.name}, as far from what is known of it as it may go."
+            yield f"At its bound: {_words(constant)}, as far from what is known of it as it may go."
     for number, free in enumerate(fitted.free):
         nothing = free.parameter.role == "strength" and fitted.x[number] == 0.0
         if fitted.held[len(fitted.u) + number] and not nothing:

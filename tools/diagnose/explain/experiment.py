@@ -1,17 +1,17 @@
-"""What to do next: from a feasible menu, the least effort that decides, else what decides most.
+"""What to do next: from a feasible menu, the least effort that decides.
 
 Between rivals, a driven experiment is foreseen: each rival, at its fit, is simulated under the
 proposed motion; the expected gain is half the squared distance of their predictions in units of
 noise (the Kullback-Leibler divergence of two equal Gaussians), for what the uncertainty of the soil
-leaves of it. Where the recordings were insufficient, what is foreseen are the effects that they
-could not have shown, each at its expected size; where the physics is not in the list, the condition
-along which the misfit lives is stepped. An instrument's reading is worth half the squared parameter
-over a fifth of its expected size.
+leaves of it. Where none is expected to tell, it is what the rivals' own files name. Where the
+recordings were insufficient, what is foreseen are the effects that they could not have shown, each
+at its expected size; where the physics is not in the list, the condition along which the misfit
+lives is stepped.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Foreseen, Rig
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
+from gritd.tools.diagnose.verdict.decide import shown
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
@@ -32,7 +32,7 @@ def next_experiment(
 ) -> NextExperiment | None:
     """None where model and recordings agree, or one explanation stands alone."""
     if decision.verdict == "insufficient":
-        return _most_shown(_unseen_shown(search))
+        return _most_shown(search)
     if decision.verdict == "unlisted":
         return _along_misfit(search.problem.stack.rig, location, _mistaken(decision))
 
@@ -40,50 +40,9 @@ def next_experiment(
     return _between(search, rivals) if len(rivals) > 1 else None
 
 
-def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
-    """What tells most rivals from the first; of equals the least effort."""
-    rig = search.problem.stack.rig
-    gains = {key: _distinguished(search, rivals, key) for key in rig.words.menu.driven} | _measured(
-        rig, rivals
-    )
-    settled = {key: sum(gain >= TUNING.screen.sure for gain in each) for key, each in gains.items()}
-
-    best = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])), default="")
-    each = gains.get(best, [])
-    least = min(TUNING.screen.sure, max(each, default=0.0))
-    distinguished = [m for m, gain in zip(rivals[1:], each, strict=False) if gain >= least > 0.0]
-    if not distinguished:
-        return _by_hand(rig, _apart(rivals))
-    return _proposed(best, float(np.mean(each)), _apart([rivals[0], *distinguished]))
-
-
-def _apart(rivals: Sequence[Model]) -> tuple[str, ...]:
-    """Names that some of these have and others have not."""
-    common = set.intersection(*(set(m.names) for m in rivals))
-    return tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in common))
-
-
-def _most_shown(gains: Mapping[str, Mapping[str, float]]) -> NextExperiment | None:
-    """The experiment with the largest median gain, and the effects that it would show."""
-    median = {key: float(np.median(list(each.values()))) for key, each in gains.items()}
-    key = max(median, key=lambda k: median[k], default="")
-    if not key or median[key] <= 0.0:
-        return None
-    shown = [n for n, gain in gains[key].items() if gain >= min(TUNING.screen.sure, median[key])]
-    return _proposed(key, median[key], tuple(shown))
-
-
-def _proposed(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
-    return NextExperiment(
-        key, EXPERIMENTS[key], separates, gain, float(1.0 / (1.0 + np.exp(-gain)))
-    )
-
-
-def _by_hand(rig: Rig, names: Sequence[str]) -> NextExperiment | None:
-    """What the rivals' own files name, where nothing is foreseen to tell."""
-    keys = (rig.effects[one].confusable_with.get(other) for one in names for other in names)
-    key = next(filter(None, keys), None)
-    return _proposed(key, float("nan"), tuple(names)) if key else None
+def _proposed(key: str, gain: float, separates: tuple[str, ...]) -> NextExperiment:
+    probability = float(1.0 / (1.0 + np.exp(-gain)))
+    return NextExperiment(key, EXPERIMENTS[key], separates, gain, probability)
 
 
 # ---- rivals ------------------------------------------------------------------------------------
@@ -96,74 +55,60 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.shown] if best.names else []
 
 
-def _distinguished(search: EffectSearch, rivals: list[Model], key: str) -> list[float]:
-    """Expected gain between the first and every other rival [nats]."""
+def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
+    """What tells most rivals from the first; of equals the least effort."""
+    rig = search.problem.stack.rig
     first, *others = (m.fitted for m in rivals)
-    return _gains(search, key, first.u, first.acting, [(m.u, m.acting) for m in others])
+    each = [(m.u, m.acting) for m in others]
+    gains = {k: _gains(search, k, first.u, first.acting, each) for k in rig.words.menu.driven}
+    told = {k: [m for m, nats in zip(rivals[1:], of, strict=True) if nats >= TUNING.screen.sure]
+            for k, of in gains.items()}  # fmt: skip
+
+    best = max(told, key=lambda k: len(told[k]), default="")
+    if best and told[best]:
+        return _proposed(best, float(np.mean(gains[best])), _apart([rivals[0], *told[best]]))
+    return _by_hand(rig, _apart(rivals))
 
 
-def _measured(rig: Rig, rivals: list[Model]) -> dict[str, list[float]]:
-    """What instruments that the rivals' own files name would tell between the first and every
-    other: half the squared larger strength, over what the instrument can tell.
-    """
-    first, *others = rivals
-    gains: dict[str, list[float]] = {}
+def _apart(rivals: Sequence[Model]) -> tuple[str, ...]:
+    """Names that some of these have and others have not."""
+    common = set.intersection(*(set(m.names) for m in rivals))
+    return tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in common))
 
-    for number, other in enumerate(others):
-        for model, rival in ((first, other), (other, first)):
-            for f, x in zip(model.fitted.free, model.fitted.x.tolist(), strict=True):
-                known = rig.effects[f.name].confusable_with
-                keys = {known[name] for name in rival.names if name in known}
-                for key in keys - set(rig.words.menu.driven):
-                    nats = 0.5 * (x / TUNING.explain.instrument) ** 2
-                    each = gains.setdefault(key, [0.0 for _ in others])
-                    if f.parameter.role == "strength":
-                        each[number] = max(each[number], nats)
 
-    return dict(sorted(gains.items()))
+def _by_hand(rig: Rig, names: tuple[str, ...]) -> NextExperiment | None:
+    """What the rivals' own files name."""
+    keys = (rig.effects[one].confusable_with.get(other) for one in names for other in names)
+    key = next(filter(None, keys), None)
+    return _proposed(key, float("nan"), names) if key else None
 
 
 # ---- insufficient, and not in the list ---------------------------------------------------------
 
 
-def _unseen_shown(search: EffectSearch) -> dict[str, dict[str, float]]:
-    """Of every driven experiment the gain for each effect that these recordings could not show
-    [nats].
+def _most_shown(search: EffectSearch) -> NextExperiment | None:
+    """The experiment with the largest median gain over the effects that these recordings could not
+    show, and those that it would show.
     """
-    rig, base = search.problem.stack.rig, search.base
-    unseen = {name: _expected(rig.effects[name]) for name in _not_shown(search)}
+    rig, u, seen = search.problem.stack.rig, search.base.fitted.u, shown(search, search.first)
+    unseen = {name: _expected(effect) for name, effect in rig.effects.items() if name not in seen}
+    each = [(u, (one,)) for one in unseen.values()]
+    gains = {key: _gains(search, key, u, (), each) for key in rig.words.menu.driven if unseen}
 
-    u, driven = base.fitted.u, rig.words.menu.driven if unseen else ()
-    every = [(u, (one,)) for one in unseen.values()]
-    gains = {key: _gains(search, key, u, (), every) for key in driven}
-    return {key: dict(zip(unseen, each, strict=True)) for key, each in gains.items()}
-
-
-def _not_shown(search: EffectSearch) -> list[str]:
-    """Effects that change nothing measured, or whose signature, at their expected size, is below
-    the alarm.
-    """
-    projection, screen = search.base.fitted.projection(), search.first
-    noise = search.problem.noise
-    size = {
-        name: float(np.trace(projection.project(whiten(noise, likeliest.columns))[0]))
-        for name, likeliest in screen.best.items()
-    }
-
-    effects = search.problem.stack.rig.effects
-    return [name for name in effects if not screen.seen(0.5 * size.get(name, 0.0))]
+    median = {key: float(np.median(of)) for key, of in gains.items()}
+    best = max(median, key=lambda k: median[k], default="")
+    if not best or median[best] <= 0.0:
+        return None
+    least = min(TUNING.screen.sure, median[best])
+    told = tuple(n for n, nats in zip(unseen, gains[best], strict=True) if nats >= least)
+    return _proposed(best, median[best], told)
 
 
 def _expected(effect: type[Effect]) -> Effect:
     """The effect at its expected size."""
-    sizes = {p.name: p.off + p.sigma for p in effect.parameters() if p.role == "strength"}
-    return effect(
-        **{
-            p.name: float(np.clip(sizes[p.name], p.low, p.high))
-            for p in effect.parameters()
-            if p.name in sizes
-        }
-    )
+    strengths = [p for p in effect.parameters() if p.role == "strength"]
+    sizes = {p.name: float(np.clip(p.off + p.sigma, p.low, p.high)) for p in strengths}
+    return effect(**sizes)
 
 
 def _mistaken(decision: Decision) -> tuple[str, ...]:

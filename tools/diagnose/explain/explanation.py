@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import hypot
 from typing import Any
 
@@ -13,7 +12,7 @@ from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed, sigmas
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
-from gritd.tools.diagnose.explain.law import FittedLaw, find_law
+from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.remainder import discrepancies, missed_words, remainders
@@ -22,11 +21,9 @@ from gritd.tools.diagnose.explain.result import (
     Explanation,
     Fit,
     Hypothesis,
-    Law,
     Location,
     Quantity,
     Remainder,
-    SoilFit,
     Test,
 )
 from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
@@ -63,7 +60,8 @@ def explain(
         location = located()
     proposed = next_experiment(search, decision, location)
 
-    law = find_law(search, base, location) if decision.verdict == "unlisted" else None
+    unlisted = decision.verdict == "unlisted"
+    law = find_law(search, location, soil, after) if unlisted else None
     left, fit = remainders(problem, accepted), _fit(problem, before, after)
     return Diagnosis(
         verdict=decision.verdict,
@@ -73,7 +71,7 @@ def explain(
         hypotheses=hypotheses,
         soil=soil,
         fit=fit,
-        law=_reported_law(law, after, soil, rig) if law else None,
+        law=law,
         next_experiment=proposed,
         caveats=_caveats(problem, accepted, whole, redo, search.failed, location),
         share=decision.share,
@@ -214,20 +212,6 @@ def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[st
     return found
 
 
-def _reported_law(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
-    """The law, and whether it carries the misfit: it takes nearly all, and foretells runs that were
-    held out better than the discrepancy of form does. Its soil is no better known than that of all
-    explanations.
-    """
-    better = float((law.plain_held.log_density - form.log_density).sum()) > 0.0
-    carries = better and law.law.share > 1.0 - TUNING.explain.held_out_worse
-    if soil is None:
-        return replace(law.law, carries=carries)
-    beside = constants_of(rig, law.plain, soil=True)
-    widened = {n: replace(q, sigma=max(q.sigma, soil.after[n].sigma)) for n, q in beside.items()}
-    return replace(law.law, carries=carries, soil=widened)
-
-
 # ---- fit and noise -- ------------------------------------------------------------------
 
 
@@ -299,15 +283,15 @@ def _remaining(
         held = listed([f"{name} ({sigmas(strain)})" for name, strain in strained])
         return f"What remains is in constants far from what is known of them: {held}."
 
-    missed = [words for channel, each in left.items() if (words := missed_words(channel, each))]
-    if decision.beside is None and decision.verdict in ("explained", "unlisted") and missed:
+    quiet = decision.verdict in ("consistent", "insufficient")
+    missed = [words for c, each in left.items() if (words := missed_words(c, each, not quiet))]
+    if decision.beside is None and missed:
         without = "Without its discrepancy of form, the model" if formed else "The model"
         return f"{without} misses {listed(missed)}."
+    if decision.beside is None and decision.verdict == "unlisted":
+        return "Soil and calibration can take up the misfit, within what is known of them."
     if decision.beside is None:
         return "Nothing above the noise remains."
 
     kinds = ", ".join(dict.fromkeys(described(f.shape) for f in decision.beside.functions))
-    return (
-        f"Something without a name remains: {kinds}. It gains {decision.beside.gain:.0f} nats of"
-        " evidence."
-    )
+    return f"Something without a name remains: {kinds}."

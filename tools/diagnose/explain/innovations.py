@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.explain.apply import applied
-from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.explain.result import Diagnosis, Fit
+
+Reads = Sequence[Callable[[], Recording]]  # give a recording each
 
 NO_FILTER = "A drive without soil: no on-line filter runs over it."
 NO_UPDATE = (
@@ -26,73 +28,41 @@ NO_UPDATE = (
 NOTHING_NEW = "Nothing was accepted, so the on-line filter stays as it is."
 
 
-@dataclass(frozen=True)
-class Filtered:
-    """Root mean square of the filter's normalised innovations, per component; `note` says why there
-    is none.
-    """
-
-    innovations: dict[str, float] | None = None
-    note: str = ""
-
-
-def filtered(
-    settings: Settings, reads: Sequence[Callable[[], Recording]], soil: bool, jobs: int = 1
-) -> Filtered:
-    """By a configuration. reads: give a recording each; soil: whether the rig has any; jobs:
-    processes.
-    """
-    if not soil:
-        return Filtered(note=NO_FILTER)
-    try:
-        ratios = innovations(settings, reads, jobs)
-    except RecordingError as error:
-        return Filtered(note=_failed(error))
-    return Filtered(ratios) if ratios else Filtered(note=NO_UPDATE)
-
-
 def with_innovations(
-    diagnosis: Diagnosis,
-    configuration: config.Configuration,
-    before: Filtered,
-    reads: Sequence[Callable[[], Recording]],
-    jobs: int = 1,
+    diagnosis: Diagnosis, configuration: config.Configuration, reads: Reads, jobs: int = 1
 ) -> Diagnosis:
-    """The result with the filter's normalised innovations by the given configuration, `before`, and
-    by the improved one; jobs: processes.
-
-    reads: give a recording each, called only where there is an improved one. Where there is none
-    `innovation_note` says why.
+    """The result with the filter's normalised innovations by the given configuration and by the
+    improved one; where there are none, `innovation_note` says why. jobs: processes.
     """
-    after = before
-    if before.innovations is not None:
-        after = Filtered(before.innovations, NOTHING_NEW)
-        if diagnosis.accepted or diagnosis.law is not None:
-            try:
-                improved = config.loads(applied(configuration, diagnosis), "improved configuration")
-                after = filtered(improved.settings, reads, True, jobs)
-            except config.ConfigError as error:
-                after = Filtered(note=_failed(error))
-
-    compared = before.innovations if after.innovations else None
-    fit = replace(
-        diagnosis.fit,
-        innovation_before=compared,
-        innovation_after=after.innovations,
-        innovation_note=after.note,
-    )
+    try:
+        fit = _compared(diagnosis, configuration, reads, jobs)
+    except (RecordingError, config.ConfigError) as error:
+        note = f"The on-line filter could not run: {error}."
+        fit = replace(diagnosis.fit, innovation_note=note)
     return replace(diagnosis, fit=fit)
 
 
-def _failed(error: Exception) -> str:
-    return f"The on-line filter could not run: {error}."
+def _compared(
+    diagnosis: Diagnosis, configuration: config.Configuration, reads: Reads, jobs: int
+) -> Fit:
+    fit = diagnosis.fit
+    if diagnosis.soil is None:
+        return replace(fit, innovation_note=NO_FILTER)
+
+    before, note = innovations(configuration.settings, reads, jobs), NOTHING_NEW
+    after = before
+    if before and (diagnosis.accepted or diagnosis.law is not None):
+        improved = config.loads(applied(configuration, diagnosis), "improved configuration")
+        after, note = innovations(improved.settings, reads, jobs), ""
+
+    if not after:
+        return replace(fit, innovation_note=NO_UPDATE)
+    return replace(fit, innovation_before=before, innovation_after=after, innovation_note=note)
 
 
-def innovations(
-    settings: Settings, reads: Sequence[Callable[[], Recording]], jobs: int = 1
-) -> dict[str, float]:
+def innovations(settings: Settings, reads: Reads, jobs: int = 1) -> dict[str, float]:
     """Root mean square of innovation over its stated standard deviation, per component; 1 where
-    they are true. reads: give a recording each; jobs: processes.
+    they are true. jobs: processes.
 
     Of updates that were offered, whether accepted or not.
     """

@@ -60,12 +60,13 @@ def _share(columns: Array, left: Array) -> float:
     return 1.0 - float(np.sum((about - fitted) ** 2)) / max(float(about @ about), SQUARE)
 
 
-def missed_words(channel: str, left: Remainder) -> str:
-    """A channel and what is missed of it; empty where that is within the noise."""
+def missed_words(channel: str, left: Remainder, where: bool) -> str:
+    """A channel and what is missed of it, and where; empty where that is within the noise."""
     if left.where == WITHIN:
         return ""
     unit, factor = shown(left.unit)
-    return f"{spelled(channel)} by {spaced(left.rms * factor, unit, 2)} ({left.where})"
+    missed = f"{spelled(channel)} by {spaced(left.rms * factor, unit, 2)}"
+    return f"{missed} ({left.where})" if where else missed
 
 
 def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:

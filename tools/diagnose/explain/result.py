@@ -157,19 +157,19 @@ class Fit:
 @dataclass(frozen=True)
 class Law:
     """An empirical expression for what no listed effect explains, in the channel's unit, valid
-    inside `domain`. carries: whether it foretells runs that were held out better than the
-    discrepancy of form does; then it alone is written into a configuration, else that alone.
+    inside `domain`. It predicts runs that were held out better than the discrepancy of form does,
+    and is what is written into a configuration, in place of that.
+
+    share: of the misfit, by squares; parameters: of effect `empirical_law`; soil: as fitted beside.
     """
 
     channel: str
     expression: str
     domain: Mapping[str, tuple[float, float]]
-    share: float  # of the explainable misfit
-    parameters: Mapping[
-        str, Quantity
-    ]  # of effect `empirical_law`, where it can be put into a configuration
-    carries: bool = False
-    soil: Mapping[str, Quantity] = field(default_factory=dict)  # as fitted beside it
+    share: float
+    parameters: Mapping[str, Quantity]
+    carries: bool = True
+    soil: Mapping[str, Quantity] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -97,7 +97,8 @@ def _grouped(lines: Sequence[SpectralLine]) -> list[list[SpectralLine]]:
     for line in lines:
         for group in groups:
             if abs(line.at - group[0].at) < line.cell:
-                group.append(line)
+                if line.channel not in [x.channel for x in group]:
+                    group.append(line)
                 break
         else:
             groups.append([line])

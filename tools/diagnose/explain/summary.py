@@ -43,27 +43,26 @@ def summary(
     sentences = [f"{subject} differ {p}."]
     if location:
         first = location[0]
-        unseen = "" if first.channel in worse(fit) else f"; {_held_out(fit, first.channel)}"
+        off = _off(fit, first.channel, decision.verdict == "explained")
+        unseen = "" if first.channel in worse(fit) else f"; on unseen runs {off}"
         sentences = [f"{first.where} {p}{unseen}."]
     if decision.verdict == "unlisted":
         resembled = [(r, decision.groups.get(r.name, ())) for r in decision.resembled]
-        sentences += [_unexplained(decision), *(_resembling(*each) for each in resembled)]
+        sentences += [_unexplained(decision), *(_resembling(decision, *each) for each in resembled)]
         return " ".join(sentences)
 
-    names = listed(list(decision.best.names))
-    verb = "explains" if len(decision.best.names) == 1 else "explain"
-    sentences.append(f"{names} {verb} {percent(decision.share)} of the misfit.")
+    names = [_likely(decision, name) for name in decision.best.names]
+    verb = "explains" if len(names) == 1 else "explain"
+    sentences.append(f"{listed(names)} {verb} {percent(decision.share)} of the misfit.")
     return " ".join((*_worse(fit), *sentences, *_alike(decision), *_beside(decision)))
 
 
 def worse(fit: Fit) -> list[str]:
-    """Channels whose held-out error has grown beyond the noise, the worst first: what was found
-    explains the misfit in part at best.
+    """Channels whose held-out error has grown by more than their noise, the worst first: what was
+    found explains the misfit in part at best.
     """
-    grown = {c: fit.after[c] - fit.before[c] for c in fit.unit}
-    share = TUNING.explain.held_out_worse
-    far = [c for c in grown if grown[c] > share * max(fit.before[c], fit.noise_floor[c])]
-    return sorted(far, key=lambda c: -grown[c] / fit.noise_floor[c])
+    grown = {c: (fit.after[c] - fit.before[c]) / fit.noise_floor[c] for c in fit.unit}
+    return sorted((c for c in grown if grown[c] > 1.0), key=lambda c: -grown[c])
 
 
 def _quiet(decision: Decision, agree: str, p: str, strained: Sequence[tuple[str, float]]) -> str:
@@ -76,20 +75,22 @@ def _quiet(decision: Decision, agree: str, p: str, strained: Sequence[tuple[str,
     )
 
 
-def _held_out(fit: Fit, channel: str) -> str:
+def _off(fit: Fit, channel: str, named: bool = True) -> str:
+    """Held-out error of a channel; if something is named, before and after."""
     unit, factor = shown(fit.unit[channel])
     before, after = (number(of[channel] * factor) for of in (fit.before, fit.after))
-    return f"{spelled(channel)} on unseen runs {before} {unit} off before, {after} after"
+    return f"{before} {unit} off before, {after} after" if named else f"{before} {unit} off"
 
 
 def _worse(fit: Fit) -> Iterator[str]:
     if far := worse(fit):
-        each = listed([_held_out(fit, channel) for channel in far])
-        these = "these channels: their" if far[1:] else "this channel: its"
-        yield (
-            f"In part only: {each}. Check how the configuration maps {these} side of the drive,"
-            " sign and scale."
-        )
+        each = listed([f"{spelled(c)} on unseen runs {_off(fit, c)}" for c in far])
+        yield f"In part only: {each}. Check sign, scale and place of this in the configuration."
+
+
+def _likely(decision: Decision, name: str) -> str:
+    """An effect with its probability."""
+    return f"{name} ({percent(decision.probability.get(name, 0.0))})"
 
 
 def _alike(decision: Decision) -> Iterator[str]:
@@ -98,7 +99,7 @@ def _alike(decision: Decision) -> Iterator[str]:
     for name in names:
         if rivals := decision.groups.get(name):
             it = name if len(names) > 1 else "It"
-            alike = ", ".join(sorted(rivals))
+            alike = listed([_likely(decision, rival) for rival in rivals])
             yield f"{it} cannot be distinguished from {alike} with these recordings."
 
 
@@ -108,31 +109,28 @@ def _beside(decision: Decision) -> Iterator[str]:
 
 
 def _unexplained(decision: Decision) -> str:
-    """That no effect is named; where some are likely together but none alone, which."""
+    """That no effect is named; which are likely, and how likely it is that none of the list is
+    there.
+    """
     chances = sorted(decision.probability.items(), key=lambda item: -item[1])
     best = chances[0][1] if chances else 0.0
-    alike = {name: p for name, p in chances if p > best * np.exp(-TUNING.verdict.alike)}
-    together = sum(alike.values())
-    if len(alike) < 2 or not best <= decision.unlisted < together:
+    alike = [name for name, p in chances if p > best * np.exp(-TUNING.verdict.alike)]
+    together = sum(decision.probability[name] for name in alike)
+    if decision.resembled or together <= decision.unlisted:
         return "No listed effect explains it."
-    return (
-        f"One of {', '.join(alike)} is there with {percent(together)}, but none of these alone is"
-        f" likelier than that nothing of the list is ({percent(decision.unlisted)})."
-    )
+    each = listed([_likely(decision, name) for name in alike])
+    none = percent(decision.unlisted)
+    return f"No listed effect is sure enough to be named: {each}; none of the list: {none}."
 
 
-def _resembling(of: Resembled, rivals: Sequence[str]) -> str:
+def _resembling(decision: Decision, of: Resembled, rivals: Sequence[str]) -> str:
     """What resembles the misfit as well as its rivals do, and why it does not explain it."""
-    why = (
-        f"in a form {percent(of.forms)} off ours"
-        if round(of.forms, 2) > 0.0
-        else "and no more of it"
-    )
+    how = f" if its formula is bent by {percent(of.forms)}" if round(of.forms, 2) > 0.0 else ""
     if not of.predicts:
-        why = "but unseen runs are predicted worse with it"
+        how = ", but unseen runs are predicted worse with it"
     where = PLACE_OF[EFFECTS[of.name].stage]
-    taken = f"takes {percent(of.share)} of the misfit, {why}: probably something else in {where}."
+    taken = f"takes {percent(of.share)} of the misfit{how}: probably something else in {where}."
     if not rivals:
-        return f"It resembles {of.name}, which {taken}"
-    alike = ", ".join((of.name, *sorted(rivals)))
+        return f"It resembles {_likely(decision, of.name)}, which {taken}"
+    alike = ", ".join(_likely(decision, name) for name in (of.name, *rivals))
     return f"It resembles {alike}, which these recordings do not distinguish. {of.name} {taken}"

@@ -57,6 +57,8 @@ def label(candidate: Candidate) -> str:
 
 def described(shape: Shape) -> str:
     """A misfit without a name in words: `a step in drawbar pull along the bed`."""
+    if shape.along == ("constant",):
+        return f"an offset of {spelled(shape.channel)}"
     where = " and ".join(PLACES.get(name, f"with {spelled(name)}") for name in shape.along)
     kind = "smooth change" if shape.kind == "smooth" else shape.kind
     return f"a {kind} in {spelled(shape.channel)} {where}"
@@ -92,15 +94,6 @@ def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> s
     size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else signed(value, unit)
     moved = f"the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
     return _started(f"{spelled(channel)}, {moved}")
-
-
-def term(stack: Stack, shape: Shape, size: float) -> str:
-    """A wave or a step as a term of a law; size in the channel's unit."""
-    (axis,), at = shape.along, shape.at
-    assert at is not None
-    if shape.kind == "wave":
-        return f"{_amplitude(stack, shape.channel, size)} every {_length(stack, axis, 1.0 / at)}"
-    return f"{signed(size, stack.rig.units[shape.channel])} beyond {value_of(stack, axis, at)}"
 
 
 def signed(value: float, unit: str) -> str:

@@ -146,15 +146,6 @@ class Problem:
         gram[np.diag_indices_from(gram)] += 1.0
         return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 
-    def beside(self, columns: Array) -> Problem:
-        """The same with more columns (N, m), each one standard deviation, that no effect stands
-        for.
-        """
-        more = random_effect("nameless", columns, self.noise, Sizes())
-        other = self._with([(more, 1.0)])
-        other.fixed = (*self.fixed, more)
-        return other
-
     def with_terms(self, terms: Sequence[RandomEffect], sizes: Sequence[float]) -> Problem:
         """The same with terms of given sizes."""
         sized = [(f, size) for f, size in zip(terms, sizes, strict=True) if size > 0.0]

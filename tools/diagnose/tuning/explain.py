@@ -18,15 +18,7 @@ class Explain:
     doubtful: float = tuned(3.0, "σ", "from what is known, or times the stated noise: reported")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is reported")
 
-    # --- summary.py ---
-    held_out_worse: float = tuned(
-        0.1, "share", "that a held-out error grows by, or a law leaves: an explanation in part"
-    )
-
     # --- experiment.py ---
-    instrument: float = tuned(
-        0.2, "-", "of an expected size: what tape, level or clamp meter can tell"
-    )
     foreseen_error: float = tuned(
         0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
     )
@@ -43,19 +35,13 @@ class Explain:
     summed_steps: int = tuned(801, "points", "about each of the two", "run time")
 
     # --- law.py ---
+    law_leaves: float = tuned(0.1, "share", "of the misfit at most: else the law is none of it")
 
     # --- locate.py ---
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
 
-    # --- provenance.py ---
-    same_wheel: float = tuned(0.1, "-", "of radius and width: more is another wheel, no correction")
-
-    # --- remainder.py ---
-
     # --- traces.py ---
     digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
-
-    # --- wording.py ---
 
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")

@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
@@ -40,9 +39,8 @@ def decide(
     """
     screen = search.first
     if not screen.alarmed:
-        verdict: Verdict = (
-            "consistent" if power(search, screen) >= TUNING.verdict.power else "insufficient"
-        )
+        power = len(shown(search, screen)) / max(len(search.problem.stack.rig.effects), 1)
+        verdict: Verdict = "consistent" if power >= TUNING.verdict.power else "insufficient"
         return Decision(verdict, search.bare, 0.0, None, _quiet(search, screen), 0.0, {})
 
     step("weighing what has no name")
@@ -217,11 +215,10 @@ def _trust(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> d
     return {name: sum(w.probability * w.trusts[name] for w in alike) / total for name in best.names}
 
 
-def taken_share(search: EffectSearch, model: Model, more: Array | None = None) -> float:
+def taken_share(search: EffectSearch, model: Model) -> float:
     """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
     leaves when its effects are switched off and all else stays. Other forms of an effect do not
-    count, but for zeros, which no law tells how to go. more: (N,) what acts beside the effects and
-    counts as theirs, in the channels' units.
+    count, but for zeros, which no law tells how to go.
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
@@ -230,8 +227,7 @@ def taken_share(search: EffectSearch, model: Model, more: Array | None = None) -
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
 
-    taken = model.zeros() + (0.0 if more is None else whiten(search.problem.noise, more))
-    left = [off.residual - shared, fitted.residual - shared - taken]
+    left = [off.residual - shared, fitted.residual - shared - model.zeros()]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 
@@ -281,14 +277,14 @@ def _groups(weighed: Sequence[WeighedExplanation], best: Model) -> dict[str, tup
     return out
 
 
-def power(search: EffectSearch, screen: Screen) -> float:
-    """Share of the listed effects that would be seen at their expected size; those that change
-    nothing measured would not. Beside a reference that was driven elsewhere little would.
+def shown(search: EffectSearch, screen: Screen) -> list[str]:
+    """The listed effects that would be seen at their expected size; those that change nothing
+    measured would not. Beside a reference that was driven elsewhere little would.
     """
     projection = search.base.fitted.projection()
     seen = []
-    for likeliest in screen.best.values():
+    for name, likeliest in screen.best.items():
         a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
-        seen.append(screen.seen(likeliest.prior + log_bayes_expected(np.diag(a))))
-
-    return sum(seen) / max(len(search.problem.stack.rig.effects), 1)
+        if screen.seen(likeliest.prior + log_bayes_expected(np.diag(a))):
+            seen.append(name)
+    return seen

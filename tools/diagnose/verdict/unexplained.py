@@ -41,11 +41,6 @@ def unexplained_with(screening: Screening, model: Model) -> UnexplainedTerms | N
     return UnexplainedTerms(best, tuple(chosen), gain) if gain > 0.0 else None
 
 
-def unexplained_functions(screening: Screening, model: Model) -> list[Signature]:
-    """Unexplained terms that act together beside a model."""
-    return _chosen(screening, model)[0]
-
-
 def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> Model:
     """With functions of a size that the recordings tell."""
     problem, fitted = screening.problem, model.fitted

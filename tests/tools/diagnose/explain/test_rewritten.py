@@ -64,7 +64,7 @@ def test_a_misfit_without_a_name_has_one_carrier(rig: Path, carries: bool) -> No
     """
     terms = {"torque_slip": Quantity(-0.6, 0.05, "N*m")}
     beside = {**soil(812.0, 64.0, 0.0).after, "c": Quantity(900.0, 70.0, "Pa")}
-    law = Law("torque", "torque −0.6·i", {}, 0.95, terms, carries, beside)
+    law = Law("torque", "torque −0.6·i", {}, 0.95, terms, soil=beside) if carries else None
     averaged = soil(812.0, 64.0, 0.0)
     diagnosis = base(verdict="unlisted", hypotheses=(), soil=averaged, law=law, learnt=learnt())
 

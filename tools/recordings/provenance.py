@@ -1,4 +1,4 @@
-"""What a recording says of the testbed it was made on, against the configuration it is diagnosed
+"""What a recording says of the testbed it was made on, against the configuration it is used
 with.
 
 The wrong file after `--config` makes a mismatch that no physics explains. A recording holds the
@@ -16,10 +16,10 @@ from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 WHEEL = "wheel."  # begins the keys of what no calibration mends
+SAME_WHEEL = 0.1  # share of radius and width: more is another wheel, no correction
+ROUNDED = 1e-6  # share by which a number may differ that was written and read
 
 
 def check_rig(recordings: Sequence[Recording], settings: Settings, source: str) -> None:
@@ -39,7 +39,7 @@ def check_rig(recordings: Sequence[Recording], settings: Settings, source: str) 
 def _other_rig(recorded: Settings, settings: Settings) -> str:
     """What tells two testbeds apart; '' where nothing does."""
     named = recorded.testbed != settings.testbed
-    limit = SLIGHT if named else TUNING.explain.same_wheel
+    limit = ROUNDED if named else SAME_WHEEL
     differing = [text for text in _differences(recorded, settings, limit) if named or WHEEL in text]
     name = [f"testbed {recorded.testbed!r} (configuration: {settings.testbed!r})"] if named else []
     return ", ".join([*name, *differing]) if differing else ""
@@ -50,7 +50,7 @@ def remarks(recordings: Sequence[Recording], settings: Settings) -> list[str]:
     shared: dict[tuple[str, ...], list[str]] = {}
     for recording in recordings:
         recorded = _recorded(recording) or settings
-        if differing := tuple(_differences(recorded, settings, SLIGHT)):
+        if differing := tuple(_differences(recorded, settings, ROUNDED)):
             shared.setdefault(differing, []).append(recording.path.name)
     return [
         f"{_listed(names)} recorded with {', '.join(differing)}."

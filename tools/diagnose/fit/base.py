@@ -107,4 +107,4 @@ def allowed(stack: Stack) -> Array:
     """
     share = TUNING.fit.tolerance
     smooth = (tolerance(stack, share), share * of_differences(stack))
-    return np.column_stack((*smooth, stack.unrest, stack.reliefs, stack.doubts))
+    return np.column_stack((*smooth, stack.nuisances, stack.doubts))

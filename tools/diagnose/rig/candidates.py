@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-import numpy as np
-
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
-from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.signals import Signals
 
 
@@ -22,19 +19,7 @@ def candidates(signals: Sequence[Signals], left_out: Collection[str]) -> dict[st
 
 
 def tables(signals: Sequence[Signals]) -> bool:
-    """Whether all recordings are tables of steady states."""
-    return all(steady_states(s) for s in signals)
-
-
-def steady_states(signals: Signals) -> bool:
-    """Whether a recording is a table of steady states, as it says itself: time, place and wheel
-    angle in it mean nothing. Short runs at steady speeds are none.
+    """Whether all recordings are tables of steady states, as they say themselves: time, place and
+    wheel angle in them mean nothing. Short runs at steady speeds are none.
     """
-    return signals.info.steady_states
-
-
-def unbroken(signals: Signals) -> list[Index]:
-    """The stretches between silences, of a table its rows: which values (n,) each has."""
-    known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
-    stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
-    return [at for at in stretches if at.size]
+    return all(s.info.steady_states for s in signals)

@@ -10,10 +10,11 @@ from gritd.estimator.config.settings import Calibration, ConfiguredEffect, Setti
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.cli.wording import percent
 from gritd.tools.diagnose.rig.interface import HAD, Constant
-from gritd.tools.diagnose.rig.weight_sets import WeightSets
+from gritd.tools.diagnose.rig.weights import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
+SOIL = ("c", "tan_phi", "k", "n", "K")
 LEAN = "side_force_lean"
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "side_force": "N", "load": "N",

@@ -20,7 +20,6 @@ from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.on_grid import on_grid
 from gritd.tools.diagnose.orders.phases import guide, shifts
 from gritd.tools.diagnose.orders.stretches import GridMotion, Samples, Series, steady_samples
-from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.signals import Signals, series_of
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -69,7 +68,7 @@ def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Sa
     """Readings of each channel while the wheel drives steadily, at most so many; of a table of
     steady states none.
     """
-    if steady_states(signals):
+    if signals.info.steady_states:
         return {}
     since = {name: _since(signals, read) for name, read in full.items() if name != "temperature"}
     angle = since.pop("wheel_encoder")
@@ -78,7 +77,7 @@ def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Sa
 
 def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
     """Signals with the lines as they stand at the grid's times."""
-    if steady_states(signals):
+    if signals.info.steady_states:
         return signals
 
     angle, motion = _since(signals, full["wheel_encoder"]), _motion(signals)

@@ -227,10 +227,8 @@ class Rig:
     stated_noise: standard deviation of one reading of a channel as the configuration states it.
     unit_factors: from a parameter of the library in such a unit to what it means for this rig.
     motion_sigma: per run, standard deviation of a prediction by what is left open of the motion.
-    unrest:     of each part that moves, per run, what every channel is predicted too low by if the
-        unrest of its speed is noise of the sensor.
-    reliefs:    of each wave of a surface that was prepared anew, per run what every channel reads
-        of it, one standard deviation.
+    nuisances:  what every fit may be off by, each per run in every channel, one standard deviation:
+        unrest of a speed that is noise of the sensor, waves of a bed that was prepared anew.
     """
 
     runs: Sequence[GridRun]
@@ -258,8 +256,7 @@ class Rig:
     stated_noise: Mapping[str, float] = field(default_factory=dict)
     unit_factors: Mapping[str, float] = field(default_factory=dict)
     motion_sigma: Sequence[Channels] = ()
-    unrest: Sequence[Sequence[Channels]] = ()
-    reliefs: Sequence[Sequence[Channels]] = ()
+    nuisances: Sequence[Sequence[Channels]] = ()
 
     def recorded(self, channel: str) -> tuple[str, ...]:
         """The channels as recorded that this one is compared as: itself, or both sides of what the

@@ -7,50 +7,55 @@ from dataclasses import replace
 
 import numpy as np
 
+from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.stages.situation import Motion
-from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.diagnose.rig.covariates import covariates
-from gritd.tools.diagnose.rig.interface import Bools, GridRun
-from gritd.tools.diagnose.rig.recorded import measured_of
-from gritd.tools.diagnose.rig.signals import Signals
+from gritd.estimator.stages.history import rate_of
+from gritd.estimator.stages.situation import Motion, situation_of
+from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
+from gritd.tools.diagnose.rig.constants import SOIL
+from gritd.tools.diagnose.rig.interface import Bools, Constant, GridRun
+from gritd.tools.diagnose.rig.recorded import Recorded, measured_of
+from gritd.tools.diagnose.rig.signals import Signals, filled
 from gritd.tools.diagnose.rig.states import states, turned_back
 from gritd.tools.diagnose.tuning import TUNING
 
+COURSE = ("wheel_angle", "position", "time", "acceleration", "heat")
 HOLDING_NOTE = (
     "The motor holds torque while the wheel stands, so its current at rest tells no offset."
 )
 
 
-def measured_run(
-    signals: Signals,
-    motion: Motion,
-    settings: Settings,
-    channels: Sequence[str],
-    sinkage: Array,
-    idle: Bools | None,
-    tabled: bool,
-) -> GridRun:
-    """One run.
+def measured_runs(
+    data: Recorded, settings: Settings, constants: Sequence[Constant]
+) -> list[GridRun]:
+    """settings: with all effects that both campaigns have."""
+    prior = {constant.name: constant.value for constant in constants}
+    soil, effects = Soil(*(prior[name] for name in SOIL)), configured(settings.effects)
+    order = TUNING.rig.quadrature_order
 
-    sinkage: the predicted one (n,) [m], as a covariate.
-    idle:    where channel torque is motor torque less axle torque, the values (n,) at which it is
-             the motor's alone; else None.
-    tabled:  whether the recordings are tables of steady states.
-    """
+    runs = []
+    for number, motion in enumerate(data.motions):
+        # the predicted sinkage [m], as a covariate: the measured one carries its channel's noise
+        predicted = simulate_arrays(settings.wheel, soil, motion, effects, order=order).sinkage
+        runs.append(_measured_run(data, number, settings, predicted))
+    return runs
+
+
+def _measured_run(data: Recorded, number: int, settings: Settings, sinkage: Array) -> GridRun:
+    signals, motion = data.signals[number], data.motions[number]
+    idle = None if data.idle is None else data.idle[number]
     constant = settings.drive.torque_constant.value
-    measured = {c: measured_of(signals, c, constant) for c in channels}
+    measured = {c: measured_of(signals, c, constant) for c in data.channels}
     if idle is not None:
         axle = np.where(idle, 0.0, measured["axle_torque"])
         measured["torque"] = measured["torque"] - axle
 
-    along = covariates(signals, motion, settings.wheel, tabled)
+    along = covariates(signals, motion, settings.wheel, data.tabled)
     along["sinkage"] = sinkage
 
     driving, resting, lifted = states(motion, settings)
-    turned = np.zeros(driving.size, bool) if tabled else turned_back(motion, settings)
+    turned = np.zeros(driving.size, bool) if data.tabled else turned_back(motion, settings)
     still = {"torque": driving | resting | lifted | turned}
     alone = np.zeros(driving.size, bool) if idle is None else idle
     if idle is not None:
@@ -58,40 +63,39 @@ def measured_run(
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
-    used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in channels}
+    used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in data.channels}
     marks = (alone.astype(float), (turned & ~driving).astype(float))
     return GridRun(signals.name, np.asarray(motion.time), measured, used, along, *marks)
 
 
-def idle_values(
-    signals: Sequence[Signals], motions: Sequence[Motion], settings: Settings
-) -> list[Bools]:
-    """Where the wheel stands or is lifted, and the axle's torque is nil; (n,) of each run. What the
-    motor draws there it loses, and the noise of the axle's sensor need not be added to it.
+def covariates(
+    signals: Signals, motion: Motion, wheel: Wheel, tabled: bool = False
+) -> dict[str, Array]:
+    """Of one run (n,) each, SI; `rolled` is the angle [rad] that the wheel has turned, either way.
+
+    tabled: a table of steady states has no course of time, place and wheel angle: these are 0, so
+        that the order of scatter that an importer drew is never taken for a trend or a ripple.
     """
-    axles = [np.nan_to_num(measured_of(one, "axle_torque", 1.0)) for one in signals]
-    every = [states(motion, settings) for motion in motions]
-    driven = np.concatenate([a[driving] for a, (driving, _, _) in zip(axles, every, strict=True)])
-    least = TUNING.rig.holding * float(np.sqrt(np.mean(driven**2))) if driven.size else 0.0
+    situation, angle = situation_of(motion, wheel), np.asarray(motion.wheel_angle)
+    current = filled(signals.analogue.get("current", np.zeros(signals.time.size)))
+    step = float(np.median(np.diff(signals.time)))
+    ones = np.ones(signals.time.size)
 
-    made = []
-    for axle, (_, resting, lifted) in zip(axles, every, strict=True):
-        idle = np.zeros(axle.size, bool)
-        for state in (resting, lifted):
-            edges = np.flatnonzero(np.diff(state.astype(int), prepend=0, append=0))
-            for first, end in edges.reshape(-1, 2):
-                idle[first:end] = abs(float(np.mean(axle[first:end]))) < least
-        made.append(idle)
-    return made
-
-
-def sinkage_from_prior(
-    motion: Motion, settings: Settings, soil: Soil, effects: Sequence[Effect]
-) -> Array:
-    """Sinkage (n,) [m] predicted from the prior: the measured one carries its channel's noise."""
-    return simulate_arrays(
-        settings.wheel, soil, motion, effects, order=TUNING.rig.quadrature_order
-    ).sinkage
+    known = {
+        "slip": np.asarray(situation.slip),
+        "speed": np.asarray(wheel.radius * np.abs(motion.wheel_speed)),
+        "load": np.asarray(motion.load) * ones,
+        "wheel_angle": angle,
+        "rolled": np.cumsum(np.abs(np.diff(angle, prepend=angle[0]))),
+        "position": np.asarray(situation.position),
+        "time": np.asarray(motion.time),
+        "acceleration": rate_of(motion.time, motion.wheel_speed),
+        "heat": np.cumsum(current**2) * step,
+        "direction": np.asarray(situation.direction),
+        "pass": motion.pass_number * ones,
+        "constant": ones,
+    }
+    return known | ({name: 0.0 * ones for name in COURSE} if tabled else {})
 
 
 def torque_is_held(runs: Sequence[GridRun]) -> bool:

@@ -11,7 +11,6 @@ quick changes are noise, how much of its slow ones, and by how much the mean of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -19,43 +18,36 @@ from scipy.ndimage import median_filter
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools, Channels, Constant, Predict
+from gritd.tools.diagnose.rig.recorded import Recorded
 from gritd.tools.diagnose.rig.weights import Weights
 from gritd.tools.diagnose.tuning import TUNING
 
 Parts = Sequence[Array | float]  # of each run, relative errors (n,) of a speed or of the load
 
 
-@dataclass(frozen=True, eq=False)
-class MotionErrors:
-    """See interface.Rig: `motion_sigma` and `unrest`."""
-
-    sigma: Sequence[Channels]
-    unrest: Sequence[Sequence[Channels]]
-
-
 def errors_of_motion(
-    predict: Predict,
-    constants: Sequence[Constant],
-    motions: Sequence[Motion],
-    weights: Sequence[Weights],
-    doubt: Sequence[Array],
-) -> MotionErrors:
-    """By the encoders' counts slip is uncertain by what a carriage would make of it that is off by
-    as much, `doubt` (n,) of each run. A measured load has noise, where it drives the balance.
+    predict: Predict, constants: Sequence[Constant], data: Recorded
+) -> tuple[list[Channels], list[list[Channels]]]:
+    """See interface.Rig: motion_sigma, and those of its nuisances that are the motion's.
+
+    By the encoders' counts slip is uncertain by what a carriage would make of it that is off by as
+    much. A measured load has noise, where it drives the balance.
     """
     by_carriage = _by(predict, constants, "carriage_scale")
+    doubt = [signals.doubt for signals in data.signals]
     sigma = _moved([{c: np.abs(v) for c, v in run.items()} for run in by_carriage], doubt)
-    wheel, carriage = zip(*map(unrest_of, motions), strict=True)  # slip follows their ratio
+
+    wheel, carriage = zip(*map(unrest_of, data.motions), strict=True)  # slip follows their ratio
     unrest = [_moved(by_carriage, wheel), _moved(by_carriage, [-part for part in carriage])]
-    if all(one.known for one in weights):
-        return MotionErrors(sigma, unrest)
+    if data.stated:
+        return sigma, unrest
 
     by_load = _by(predict, constants, "weights")
-    noise = _moved(by_load, [_relative_noise(one) for one in weights])
+    noise = _moved(by_load, [_relative_noise(one) for one in data.weights])
     sigma = [
         {c: np.hypot(own[c], more[c]) for c in own} for own, more in zip(sigma, noise, strict=True)
     ]
-    return MotionErrors(sigma, [*unrest, *(_moved(by_load, parts) for parts in _of_load(weights))])
+    return sigma, [*unrest, *(_moved(by_load, parts) for parts in _of_load(data.weights))]
 
 
 def _by(predict: Predict, constants: Sequence[Constant], name: str) -> list[dict[str, Array]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,78 +10,49 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.campaign import Campaign, parts_of, sensed_as
-from gritd.tools.diagnose.rig.constants import LEAN
-from gritd.tools.diagnose.rig.interface import Bools, Channels, Constant, Foreseen, Index
+from gritd.tools.diagnose.rig.constants import LEAN, SOIL
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Held
 from gritd.tools.diagnose.rig.proposals import driving, proposed
-from gritd.tools.diagnose.rig.weight_sets import WeightSets
+from gritd.tools.diagnose.rig.recorded import Recorded
 from gritd.tools.diagnose.tuning import TUNING
-
-SOIL = ("c", "tan_phi", "k", "n", "K")
-
-
-@dataclass(frozen=True)
-class Driven:
-    """What was driven, run by run.
-
-    motions: on the analysis grid.
-    steps:   grid intervals [s].
-    new:     whether candidates act; not in the runs of a reference campaign.
-    sets:    the set of weights that each value has.
-    """
-
-    motions: Sequence[Motion]
-    steps: Sequence[float]
-    new: Sequence[bool]
-    sets: WeightSets
-
-    def motions_of(self, new: bool) -> list[Motion]:
-        """Those of the new campaign, or of the reference."""
-        return [motion for motion, n in zip(self.motions, self.new, strict=True) if n == new]
-
-    def set_of(self, new: bool) -> Index:
-        """The set of weights of each value (n,) of the new campaign, or of the reference."""
-        labels = [label for label, n in zip(self.sets.label, self.new, strict=True) if n == new]
-        return np.concatenate(labels)
 
 
 class Prediction:
     """Channels of all runs, for the constants of a wheel.
 
     prepared: soil constants that a bed prepared anew has for itself; there is a constant `new_NAME`
-    of each. idle: where channel torque is compared as motor torque less axle torque, the values of
-    each run (n,) at which it is compared alone; else None. means: of each run, what is added to
-    every channel (n,); else None.
+    of each. held: of each run, what is added to every channel (n,).
     """
 
     def __init__(
         self,
         settings: Settings,
-        channels: Sequence[str],
+        data: Recorded,
         constants: Sequence[Constant],
-        driven: Driven,
         prepared: Sequence[str],
-        idle: Sequence[Bools] | None,
-        means: Sequence[Channels] | None,
+        held: Held | None,
     ) -> None:
-        self._settings, self._channels, self._constants = settings, channels, constants
-        self._means = None if means is None else [np.array([m[c] for c in channels]) for m in means]
-        self._driven, self._prepared = driven, prepared
-        self._less_axle = None if idle is None else ~np.concatenate(idle)
+        self._settings, self._constants, self._prepared = settings, constants, prepared
+        self._data, self._channels = data, data.channels
+        self._less_axle = None if data.idle is None else ~np.concatenate(data.idle)
+        self._mean: Array | float = 0.0
+        if held is not None:
+            self._mean = np.hstack([np.array([m[c] for c in data.channels]) for m in held.means])
 
         prior = {constant.name: constant.value for constant in constants}
         begins = self._soil(prior, False), self._baseline(prior)
         self._campaigns = [
-            (new, Campaign(driven.motions_of(new), settings, channels, *begins))
-            for new in sorted(set(driven.new))  # the reference first, where there is one
+            (new, Campaign(data.motions_of(new), settings, data.channels, *begins))
+            for new in sorted(set(data.new))  # the reference first, where there is one
         ]
 
-        self._parts = parts_of(driven.motions)
+        self._parts = parts_of(data.motions)
         sizes = [part.stop - part.start for part in self._parts]
-        self._load = np.concatenate([m.load * np.ones(np.size(m.time)) for m in driven.motions])
-        self._step: Array = np.repeat(driven.steps, sizes)
+        steps = [float(np.median(np.diff(s.time))) for s in data.signals]
+        self._load = np.concatenate([m.load * np.ones(np.size(m.time)) for m in data.motions])
+        self._step: Array = np.repeat(steps, sizes)
         self._inner = np.ones(sum(sizes), bool)  # with a neighbour of the same run on either side
         for part in self._parts:
             self._inner[[part.start, part.stop - 1]] = False
@@ -97,13 +67,11 @@ class Prediction:
         true = []  # readings (channels, n) of each campaign before scale, offset and delay
         for new, campaign in self._campaigns:
             acting = (*baseline, *effects) if new or everywhere else baseline
-            weights = 1.0 + value["weights"] + self._own_weights(value)[self._driven.set_of(new)]
+            weights = 1.0 + value["weights"] + self._own_weights(value)[self._data.set_of(new)]
             travelled = 1.0 + value["carriage_scale"]
             true.append(campaign.readings(self._soil(value, new), weights, travelled, acting))
 
-        read = self._read(np.hstack(true), value)
-        if self._means is not None:
-            read += np.hstack(self._means)
+        read = self._read(np.hstack(true), value) + self._mean
         return [dict(zip(self._channels, read[:, part], strict=True)) for part in self._parts]
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
@@ -112,7 +80,7 @@ class Prediction:
         sensed = simulate_arrays(
             self._settings.wheel,
             self._soil(value, True),
-            proposed(experiment, self._driven.motions, self._settings.wheel.radius),
+            proposed(experiment, self._data.motions, self._settings.wheel.radius),
             (*self._baseline(value), *effects),
             torque_constant=self._settings.drive.torque_constant.value,
             order=TUNING.rig.quadrature_order,
@@ -141,7 +109,7 @@ class Prediction:
         """Relative error of each set of weights for itself (m + 1,), the last of values without
         one.
         """
-        return np.array([*(value[name] for name in self._driven.sets.names), 0.0])
+        return np.array([*(value[name] for name in self._data.sets.names), 0.0])
 
     def _soil(self, value: Mapping[str, float], new: bool) -> Soil:
         """The soil of one campaign: a bed that was prepared anew has its own."""

@@ -3,17 +3,89 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.candidates import tables
 from gritd.tools.diagnose.rig.constants import calibration_sigmas
-from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.states import at_rest
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.signals import Signals, filled
+from gritd.tools.diagnose.rig.states import at_rest, states
+from gritd.tools.diagnose.rig.weights import Weights, WeightSets, weight_sets, weights_in
 from gritd.tools.diagnose.tuning import TUNING
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What the recordings of a wheel hold, run by run.
+
+    new:      whether candidates act; not in the runs of a reference campaign.
+    channels: those that carry information.
+    motions:  on the analysis grid; each campaign's time begins with its first run.
+    sets:     the set of weights that each value has.
+    idle:     where channel torque is compared as the loss between motor and axle, the values (n,)
+        at which it is the motor's alone; else None.
+    """
+
+    signals: Sequence[Signals]
+    new: Sequence[bool]
+    channels: tuple[str, ...]
+    weights: Sequence[Weights]
+    motions: Sequence[Motion]
+    sets: WeightSets
+    idle: Sequence[Bools] | None
+
+    @property
+    def loss(self) -> bool:
+        """Whether channel torque is the loss between two torques."""
+        return self.idle is not None
+
+    @property
+    def stated(self) -> bool:
+        """Whether all runs state their weights."""
+        return all(weights.known for weights in self.weights)
+
+    @property
+    def tabled(self) -> bool:
+        """Whether the recordings are tables of steady states."""
+        return tables(self.signals)
+
+    def motions_of(self, new: bool) -> list[Motion]:
+        """Those of the new campaign, or of the reference."""
+        return [motion for motion, n in zip(self.motions, self.new, strict=True) if n == new]
+
+    def set_of(self, new: bool) -> Index:
+        """The set of weights of each value (n,) of the new campaign, or of the reference."""
+        labels = [label for label, n in zip(self.sets.label, self.new, strict=True) if n == new]
+        return np.concatenate(labels)
+
+
+def recorded(
+    signals: Sequence[Signals], settings: Settings, reference: int, read_off: bool
+) -> Recorded:
+    """reference: how many of the runs, the first ones, are of a reference campaign; read_off: where
+    both torques are measured, channel torque is the loss between them.
+    """
+    weights = weights_in(signals, settings)
+    channels = channels_of(signals, settings, [w.known for w in weights])
+    new = [number >= reference for number in range(len(signals))]
+
+    began = {
+        which: min(s.start for s, n in zip(signals, new, strict=True) if n == which)
+        for which in set(new)
+    }
+    motions = [
+        motion_of(s, w.values, settings, s.start - began[n])
+        for s, w, n in zip(signals, weights, new, strict=True)
+    ]
+    sets = weight_sets([w.sets for w in weights])
+    loss = read_off and loss_measured(signals, channels)
+    idle = idle_values(signals, motions, settings) if loss else None
+    return Recorded(signals, new, channels, weights, motions, sets, idle)
 
 
 def channels_of(
@@ -92,8 +164,23 @@ def motion_of(signals: Signals, weights: Array, settings: Settings, began: float
     )
 
 
-def filled(values: Array) -> Array:
-    """Values (n,), NaN bridged by straight lines."""
-    good = np.isfinite(values)
-    at = np.arange(values.size)
-    return np.interp(at, at[good], values[good]) if good.any() else np.zeros(values.size)
+def idle_values(
+    signals: Sequence[Signals], motions: Sequence[Motion], settings: Settings
+) -> list[Bools]:
+    """Where the wheel stands or is lifted, and the axle's torque is nil; (n,) of each run. What the
+    motor draws there it loses, and the noise of the axle's sensor need not be added to it.
+    """
+    axles = [np.nan_to_num(measured_of(one, "axle_torque", 1.0)) for one in signals]
+    every = [states(motion, settings) for motion in motions]
+    driven = np.concatenate([a[driving] for a, (driving, _, _) in zip(axles, every, strict=True)])
+    least = TUNING.rig.holding * float(np.sqrt(np.mean(driven**2))) if driven.size else 0.0
+
+    made = []
+    for axle, (_, resting, lifted) in zip(axles, every, strict=True):
+        idle = np.zeros(axle.size, bool)
+        for state in (resting, lifted):
+            edges = np.flatnonzero(np.diff(state.astype(int), prepend=0, append=0))
+            for first, end in edges.reshape(-1, 2):
+                idle[first:end] = abs(float(np.mean(axle[first:end]))) < least
+        made.append(idle)
+    return made

@@ -28,6 +28,8 @@ def reliefs_of(
     """Of each run and each wave of its surface, per run what every channel (n,) reads of it, one
     standard deviation, in the channels' units. height: standard deviation of the surface [m].
     """
+    if "sinkage" not in channels:
+        return
     nothing: list[Mapping[str, Array]] = [
         {channel: np.zeros(run.time.size) for channel in channels} for run in runs
     ]

@@ -268,3 +268,10 @@ def doubt(wheel: Slopes, carriage: Slopes) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.hypot(wheel.sigma / wheel.rate, carriage.sigma / carriage.rate)
     return np.where(np.isfinite(share), share, 0.0)
+
+
+def filled(values: Array) -> Array:
+    """Values (n,), NaN bridged by straight lines."""
+    good = np.isfinite(values)
+    at = np.arange(values.size)
+    return np.interp(at, at[good], values[good]) if good.any() else np.zeros(values.size)

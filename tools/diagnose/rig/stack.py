@@ -74,14 +74,9 @@ class Stack:
         return self.joined(sigma) if sigma else np.zeros(self.size)
 
     @cached_property
-    def unrest(self) -> Array:
-        """Columns (N, k) in the channels' units: see Rig.unrest; those that act."""
-        return self._columns(self.rig.unrest)
-
-    @cached_property
-    def reliefs(self) -> Array:
-        """Columns (N, k) in the channels' units: see Rig.reliefs; those that act."""
-        return self._columns(self.rig.reliefs)
+    def nuisances(self) -> Array:
+        """Columns (N, k) in the channels' units: see Rig.nuisances; those that act."""
+        return self._columns(self.rig.nuisances)
 
     @cached_property
     def doubts(self) -> Array:

@@ -5,6 +5,7 @@ them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +13,8 @@ import numpy as np
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.candidates import steady_states, unbroken
-from gritd.tools.diagnose.rig.recorded import filled
-from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.rig.signals import Signals, filled
 from gritd.tools.diagnose.tuning import TUNING
 
 MEASURED_NOTE = (
@@ -89,7 +89,7 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
         return None
 
     load = filled(measured)
-    if steady_states(signals):  # one after the other, they have nothing in common
+    if signals.info.steady_states:  # one after the other, they have nothing in common
         values, sigma = _of_rows(signals, load)
         return Weights(values, values, False, load, sigma)
     values, sigma = felt(signals.time, load)
@@ -107,7 +107,9 @@ def _of_rows(signals: Signals, load: Array) -> tuple[Array, Array]:
     `felt`.
     """
     values, sigma = load.copy(), np.zeros(load.size)
-    for row in unbroken(signals):
+    known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
+    rows = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)  # silence parts them
+    for row in (at for at in rows if at.size):
         values[row] = load[row].mean()
         sigma[row] = load[row].std()
     return values, sigma
@@ -171,3 +173,35 @@ def _noise(values: Array) -> float:
     steps = np.abs(np.diff(values))
     rounding = float(steps[steps > 0.0].min() / np.sqrt(12.0)) if np.any(steps) else 0.0
     return max(float(NORMAL * np.median(steps) / np.sqrt(2.0)), rounding)
+
+
+# ---- sets of weights: what hangs on the axle is one for each load, and each errs for itself ------
+
+
+@dataclass(frozen=True)
+class WeightSets:
+    """Loads (m,) of the sets [N]; which of them each value has, per run (n,), −1 for none."""
+
+    loads: tuple[float, ...]
+    label: tuple[Index, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(f"weights_{load:.4g}" for load in self.loads)
+
+
+def weight_sets(loads: Sequence[Array]) -> WeightSets:
+    """The sets in use, from the weights (n,) of each run [N]; none where all runs have the same."""
+    values, count = np.unique(np.concatenate(loads), return_counts=True)
+    held = values[(count >= TUNING.rig.encoder_readings) & (values > 0.0)]
+    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.least_weights) + 1)
+    if not 1 < len(sets) <= TUNING.noise.most_cells:
+        none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
+        return WeightSets((), none)
+    middle = np.array([one.mean() for one in sets])
+    return WeightSets(tuple(middle.tolist()), tuple(_nearest(load, middle) for load in loads))
+
+
+def _nearest(load: Array, middle: Array) -> Index:
+    apart = np.abs(load[:, None] / middle - 1.0)
+    return np.where(apart.min(axis=1) <= TUNING.rig.least_weights, apart.argmin(axis=1), -1)

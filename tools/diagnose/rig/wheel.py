@@ -4,8 +4,8 @@ forward model out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -14,10 +14,9 @@ import numpy as np
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
-from gritd.estimator.terramechanics.soil import Soil
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.phases import guide
-from gritd.tools.diagnose.rig.candidates import candidates, tables
+from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.full_rate import aligned
@@ -27,33 +26,25 @@ from gritd.tools.diagnose.rig.interface import (
     Constant,
     FormSource,
     GridRun,
+    Held,
     LawForm,
     Rig,
     RigWords,
 )
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
-    idle_values,
-    measured_run,
-    sinkage_from_prior,
+    measured_runs,
     torque_is_held,
     without_torque_at_rest,
 )
 from gritd.tools.diagnose.rig.motion_error import errors_of_motion
-from gritd.tools.diagnose.rig.prediction import SOIL, Driven, Prediction
+from gritd.tools.diagnose.rig.prediction import Prediction
 from gritd.tools.diagnose.rig.proposals import MENU
-from gritd.tools.diagnose.rig.recorded import (
-    channels_of,
-    loss_measured,
-    measured_of,
-    motion_of,
-    to_one_side,
-)
+from gritd.tools.diagnose.rig.recorded import Recorded, measured_of, recorded, to_one_side
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stated_noise import noise_of_readings
-from gritd.tools.diagnose.rig.weight_sets import WeightSets, weight_sets
-from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_in
+from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
@@ -77,19 +68,6 @@ LAW_TERMS = {"constant": "1", "slip": "i", "slip_squared": "i²", "sinkage": "z/
 LAW_NOTE = "ν = ln((rω + 1 mm/s)/(21 mm/s))"
 
 
-@dataclass(frozen=True, eq=False)
-class _Recorded:
-    """What the recordings of a wheel hold. stated: whether all runs state their weights."""
-
-    signals: Sequence[Signals]
-    weights: Sequence[Weights]
-    stated: bool
-    channels: tuple[str, ...]
-    loss: bool  # channel torque is the loss between two torques
-    driven: Driven
-    idle: Sequence[Bools] | None
-
-
 def wheel_rig(
     signals: Sequence[Signals],
     settings: Settings,
@@ -110,49 +88,35 @@ def wheel_rig(
     signals = to_one_side(signals)
     again = partial(wheel_rig, signals, settings, reference, bed, read_off, lines)
     alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
-    data = _recorded(signals, settings, reference, read_off)
-    known = [effect.name for effect in settings.effects]
+
+    data = recorded(signals, settings, reference, read_off)
+    left_out = _left_out(settings.effects, data.stated)
     settings = replace(settings, effects=_acting(settings.effects, data.stated))
     had = _acting(had, data.stated)
-    acting = replace(settings, effects=(*settings.effects, *had))
+    acting = replace(settings, effects=(*settings.effects, *had))  # in both campaigns
 
-    anew, tabled = bool(reference) and bed == "prepared", tables(signals)
+    anew = bool(reference) and bed == "prepared"
     prepared = preparation(settings) if anew else {}
     constants = (
-        *wheel_constants(settings, data.channels, data.driven.sets, data.stated, had),
+        *wheel_constants(settings, data.channels, data.sets, data.stated, had),
         *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
     )
-    runs = _measured(data, settings, acting, constants)
+    runs = measured_runs(data, acting, constants)
     holding = "torque" in data.channels and torque_is_held(runs)
     runs = without_torque_at_rest(runs) if holding else runs
 
-    radius, held = settings.wheel.radius, None
-    if settings.discrepancy is not None:
-        held = held_form(settings.discrepancy, runs, data.channels, radius, data.loss)
-    prediction = Prediction(
-        acting,
-        data.channels,
-        constants,
-        data.driven,
-        tuple(prepared),
-        data.idle,
-        held.means if held else None,
-    )
-    errors = errors_of_motion(
-        prediction.channels,
-        constants,
-        data.driven.motions,
-        data.weights,
-        [s.doubt for s in signals],
-    )
-    relief = anew and not tabled and "sinkage" in data.channels
+    held = _held(data, settings, runs)
+    prediction = Prediction(acting, data, constants, tuple(prepared), held)
+    motion_sigma, unrest = errors_of_motion(prediction.channels, constants, data)
+    surfaces = reliefs_of(runs, data.channels, height_of(settings)) if anew else ()
+
     return Rig(
         runs=runs,
         channels=data.channels,
         units=UNITS,
         constants=constants,
-        effects=candidates(signals, _left_out(known, data.stated)),
-        new=data.driven.new,
+        effects=candidates(signals, left_out),
+        new=data.new,
         predict=prediction.channels,
         words=_words(data, settings, runs, holding),
         smooth=SMOOTH,
@@ -162,58 +126,27 @@ def wheel_rig(
         reference=alone if reference else None,
         baseline=configured(settings.effects),
         slipping="carriage_scale",
-        partial=_partial(data.driven.sets),
+        partial=_partial(data.sets),
         forms=_forms(data, runs, settings),
         held=held,
         lines=lines,
         loss_of_drive=data.loss,
-        tabled=tabled,
-        stated_noise={} if tabled else noise_of_readings(settings, data.loss),
-        motion_sigma=errors.sigma,
-        unrest=() if tabled else errors.unrest,
-        reliefs=list(reliefs_of(runs, data.channels, height_of(settings))) if relief else (),
+        tabled=data.tabled,
+        stated_noise={} if data.tabled else noise_of_readings(settings, data.loss),
+        motion_sigma=motion_sigma,
+        nuisances=() if data.tabled else (*unrest, *surfaces),
     )
 
 
-# ---- what was recorded ---------------------------------------------------------------------------
+def _held(data: Recorded, settings: Settings, runs: Sequence[GridRun]) -> Held | None:
+    """What the configuration has learnt of the form, in these runs."""
+    if settings.discrepancy is None:
+        return None
+    radius = settings.wheel.radius
+    return held_form(settings.discrepancy, runs, data.channels, radius, data.loss)
 
 
-def _recorded(
-    signals: Sequence[Signals], settings: Settings, reference: int, read_off: bool
-) -> _Recorded:
-    weights = weights_in(signals, settings)
-    known = [w.known for w in weights]
-    channels = channels_of(signals, settings, known)
-    loss = read_off and loss_measured(signals, channels)
-    new = [number >= reference for number in range(len(signals))]
-    driven = _driven(signals, weights, new, settings)
-    idle = idle_values(signals, driven.motions, settings) if loss else None
-    return _Recorded(signals, weights, all(known), channels, loss, driven, idle)
-
-
-def _measured(
-    data: _Recorded, settings: Settings, acting: Settings, constants: Sequence[Constant]
-) -> list[GridRun]:
-    """acting: settings with all effects that both campaigns have."""
-    prior = {constant.name: constant.value for constant in constants}
-    soil, effects = Soil(*(prior[name] for name in SOIL)), configured(acting.effects)
-    idles: Sequence[Bools | None] = data.idle or [None for _ in data.signals]
-
-    return [
-        measured_run(
-            one,
-            motion,
-            settings,
-            data.channels,
-            sinkage_from_prior(motion, settings, soil, effects),
-            idle,
-            tables(data.signals),
-        )
-        for one, motion, idle in zip(data.signals, data.driven.motions, idles, strict=True)
-    ]
-
-
-def _forms(data: _Recorded, runs: Sequence[GridRun], settings: Settings) -> tuple[FormSource, ...]:
+def _forms(data: Recorded, runs: Sequence[GridRun], settings: Settings) -> tuple[FormSource, ...]:
     constant = settings.drive.torque_constant.value
     motor = [measured_of(s, "torque", constant) for s in data.signals] if data.loss else None
     return wheel_forms(runs, data.channels, settings.wheel.radius, motor)
@@ -232,7 +165,7 @@ def _partial(sets: WeightSets) -> dict[str, tuple[str, Sequence[Bools]]]:
 # ---- what is said --------------------------------------------------------------------------------
 
 
-def _words(data: _Recorded, settings: Settings, runs: Sequence[GridRun], holding: bool) -> RigWords:
+def _words(data: Recorded, settings: Settings, runs: Sequence[GridRun], holding: bool) -> RigWords:
     caveats = tuple(_sentences(data, settings, holding))
     shortcomings = tuple(_shortcomings(runs, data.channels))
     return RigWords(caveats, MENU, shortcomings, _law(settings.wheel.radius, data.loss))
@@ -258,7 +191,7 @@ def _shortcomings(runs: Sequence[GridRun], channels: Sequence[str]) -> Iterator[
         yield "No force sensor: what acts on the drawbar pull alone cannot show."
 
 
-def _sentences(data: _Recorded, settings: Settings, holding: bool) -> Iterator[str]:
+def _sentences(data: Recorded, settings: Settings, holding: bool) -> Iterator[str]:
     """What to know of the comparison; holding: a servo holds torque at rest."""
     yield from (s.left_out for s in data.signals if s.left_out)
     if not data.stated:
@@ -284,26 +217,9 @@ def _reference_alone(
     return wheel_rig(aligned(signals, line), settings, read_off=read_off, lines=own)
 
 
-def _driven(
-    signals: Sequence[Signals], weights: Sequence[Weights], new: Sequence[bool], settings: Settings
-) -> Driven:
-    """Each campaign's time begins with its first run."""
-    began = {
-        which: min(s.start for s, n in zip(signals, new, strict=True) if n == which)
-        for which in set(new)
-    }
-    motions = [
-        motion_of(s, w.values, settings, s.start - began[n])
-        for s, w, n in zip(signals, weights, new, strict=True)
-    ]
-
-    steps = [float(np.median(np.diff(s.time))) for s in signals]
-    return Driven(motions, steps, new, weight_sets([w.sets for w in weights]))
-
-
-def _left_out(known: Collection[str], weights_stated: bool) -> set[str]:
+def _left_out(known: Sequence[ConfiguredEffect], weights_stated: bool) -> set[str]:
     """Effects that are no candidates."""
-    names = {*LEFT_OUT, *known}
+    names = {*LEFT_OUT, *(effect.name for effect in known)}
     return names if weights_stated else names | {AXIS_FRICTION}
 
 

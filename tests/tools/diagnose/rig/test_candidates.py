@@ -11,7 +11,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.fit.signatures import highest_order
-from gritd.tools.diagnose.rig.candidates import candidates, steady_states
+from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
@@ -55,7 +55,7 @@ def test_the_scatter_of_a_table_is_no_sensors(driven: list[Signals]) -> None:
 
 
 def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:
-    assert not any(map(steady_states, driven))
+    assert not tables(driven)
     listed = candidates(driven, ("empirical_law",))
     assert listed.keys() == {n for n, e in EFFECTS.items() if not e.filter_only} - {"empirical_law"}
     assert all(listed[name] is EFFECTS[name] for name in listed)
@@ -63,7 +63,7 @@ def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:
 
 def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[Signals]) -> None:
     table = [tabled(run) for run in driven]
-    assert all(map(steady_states, table))
+    assert tables(table)
     left = candidates(table, ())
     gone = {"gear_ripple", "hub_runout", "soil_patch", "motor_heating", "contact_relaxation"}
     assert not gone & left.keys()

@@ -85,7 +85,7 @@ def test_a_fit_knows_the_noise_of_the_wheels_speed() -> None:
     """
     base = fit_base(_noisy_rig([]))
     stack = base.problem.stack
-    assert stack.unrest.shape == (stack.size, 2)
+    assert stack.nuisances.shape == (stack.size, 2)
     wheel, _ = base.fitted.slack[base.problem.nuisance.count - 2 :]
     assert wheel == pytest.approx(1.0, abs=0.3)
 

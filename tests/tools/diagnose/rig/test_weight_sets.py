@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gritd.tools.diagnose.rig.weight_sets import weight_sets
+from gritd.tools.diagnose.rig.weights import weight_sets
 
 
 def test_loads_a_hundredth_apart_are_two_stacks() -> None:

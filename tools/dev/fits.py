@@ -126,7 +126,7 @@ def _residuals(ground: EffectsObjective, problem: Problem, centre: Array) -> Arr
     weights = ground.penalty[: centre.size]
     if not np.isfinite(nats):
         return np.full(tried.residual.size + tried.slack.size + centre.size, FAR)
-    left = tried.residual - problem.nuisance.times(tried.slack)
+    left = tried.residual - problem.nuisance.whitened.times(tried.slack)
     return np.concatenate((left, tried.slack, weights * centre))
 
 
@@ -134,7 +134,7 @@ def _slopes(ground: EffectsObjective, problem: Problem, centre: Array) -> Array:
     """Their derivatives; what is allowed follows every move, so it is eliminated exactly."""
     own = ground.linearised(ground.tried(centre)[0]).own
     follows = cho_solve((problem.root, True), problem.nuisance.pulled(own), check_finite=False)
-    left = own - problem.nuisance.times(follows)
+    left = own - problem.nuisance.whitened.dense @ follows
     return np.vstack((-left, -follows, np.diag(ground.penalty[: centre.size])))
 
 

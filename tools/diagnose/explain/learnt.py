@@ -139,7 +139,7 @@ def _source(
     number, rows = unknowns.numbers[source.name], _acting(stack, source)
     whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
     for freedom, place in zip(marginal.terms, unknowns.places, strict=True):
-        whole[:, place] = freedom.columns[rows]
+        whole[:, place] = freedom.columns.dense[rows]
     end = unknowns.places[number].stop  # what goes with the wheel's angle stands last
     whole[:, end - 2 * len(TUNING.fit.form_harmonics) : end] = 0.0
     whole[:, unknowns.place_of_held] = unknowns.held[rows]

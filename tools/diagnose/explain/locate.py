@@ -104,7 +104,7 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
         own=np.zeros_like(alone.own),
         pulled=np.zeros_like(alone.pulled),
         nuisance=alone.nuisance.without_size(),
-        residual=alone.residual - nuisance.times(fit.slack[: nuisance.count]),
+        residual=alone.residual - nuisance.whitened.times(fit.slack[: nuisance.count]),
     )
     return Model(held)
 

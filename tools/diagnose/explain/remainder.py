@@ -80,7 +80,7 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
         learnt = "reference" if stack.referred else "recordings"
         for number, freedom in enumerate(marginal.terms):
             size = marginal.size_of(model.chosen, number)
-            squares += size**2 * np.sum(freedom.columns**2, axis=1)
+            squares += size**2 * np.sum(freedom.columns.dense**2, axis=1)
 
     found = {}
     for channel in rig.channels:

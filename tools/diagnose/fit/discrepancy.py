@@ -10,6 +10,7 @@ equations shows so by itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def usual_sizes(stack: Stack, forms: Sequence[RandomEffect], model: Model) -> Ch
     for number, one in enumerate(forms):
         most = len(one.sizes.values) - 1
         if one.name in held:
-            off = _rms(one.columns @ model.of_form(number))
+            off = _rms(one.columns.times(model.of_form(number)))
             usual = off <= max(TUNING.fit.form_error_sizes) * _rms(held[one.name])
             most = model.sizes[number] if usual else 0
         out.append(most)
@@ -106,12 +107,9 @@ def _smooth(stack: Stack, source: FormSource) -> Array:
     if not acting.any():
         return np.zeros((stack.size, 0))
 
-    conditions = conditions_at(stack, source)
-    shared = stack.referred
-    most = TUNING.fit.form_features_shared if shared else TUNING.fit.form_features
-    features = features_of(conditions[acting], most, TUNING.fit.form_left_out)
-    smooth = np.zeros((stack.size, len(features.points)))
-    smooth[acting] = features.at(conditions[acting])
+    features = _features(stack, source, acting)
+    smooth = np.zeros((stack.size, features.shape[1]))
+    smooth[acting] = features
 
     angle = stack.covariate("wheel_angle")
     turning = [
@@ -121,6 +119,20 @@ def _smooth(stack: Stack, source: FormSource) -> Array:
     ]
     size = _size(stack, source, acting) if source.size is None else source.size
     return np.column_stack((smooth, *turning)) * weight[:, None] * size
+
+
+_formed: WeakKeyDictionary[Stack, dict[str, Array]] = WeakKeyDictionary()
+
+
+def _features(stack: Stack, source: FormSource, acting: Bools) -> Array:
+    """Of unit variance (n, m) on the n values where a source acts; formed once."""
+    known = _formed.setdefault(stack, {})
+    if source.name not in known:
+        conditions = conditions_at(stack, source)[acting]
+        fit = TUNING.fit
+        most = fit.form_features_shared if stack.referred else fit.form_features
+        known[source.name] = features_of(conditions, most, fit.form_left_out).at(conditions)
+    return known[source.name]
 
 
 def _without_levels(columns: Array, weight: Array) -> Array:

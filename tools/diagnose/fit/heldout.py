@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.columns import Columns
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
@@ -75,34 +76,35 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     """
     own = fitted.nuisance.carried
     j, r = fitted.jacobian, fitted.residual
-    last = j.shape[1] - own.shape[1]
+    last = j.count - own.count
     size = len(fitted.u) + len(fitted.x)
     centre = np.concatenate(
         (fitted.u, fitted.x, np.zeros_like(fitted.slack))
     )  # r is the residual without tolerance
 
     penalty = fitted.penalty**2
-    gram, score = fitted.gram + np.diag(penalty), j.T @ r - penalty * centre
+    gram, score = fitted.gram + np.diag(penalty), j.pulled(r) - penalty * centre
     joint = cholesky(gram, lower=True, check_finite=False)
     density, predicted = [], fitted.predicted.copy()
 
     for fold in folds:
-        inside = j[fold]
-        less = cholesky(gram - inside.T @ inside, lower=True, overwrite_a=True, check_finite=False)
-        step = cho_solve((less, True), score - inside.T @ r[fold], check_finite=False)
-        predicted[fold] = (
-            fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
-        )
-        density.append(_log_density(r[fold] - inside @ step, inside, joint, less))
+        inside = j.of_rows(fold)
+        others = gram - inside.products(inside)
+        less = cholesky(others, lower=True, overwrite_a=True, check_finite=False)
+        step = cho_solve((less, True), score - inside.pulled(r), check_finite=False)
+        moved = fitted.predicted + fitted.raw @ step[:size] + own.times(step[last:])
+        predicted[fold] = moved[fold]
+        error = np.where(fold, r - inside.times(step), 0.0)
+        density.append(_log_density(error, inside, joint, less))
     return HeldOut(np.array(density), predicted)
 
 
-def _log_density(error: Array, jacobian: Array, joint: Array, others: Array) -> float:
+def _log_density(error: Array, jacobian: Columns, joint: Array, others: Array) -> float:
     """ln N(error; 0, I + J A⁻¹ Jᵀ) without the constant, by the matrix inversion lemma.
 
     joint, others: Cholesky roots (q, q) of A + JᵀJ, and of the products A of the other values.
     """
-    pulled = solve_triangular(joint, jacobian.T @ error, lower=True, check_finite=False)
+    pulled = solve_triangular(joint, jacobian.pulled(error), lower=True, check_finite=False)
     spread = np.log(np.diag(joint)).sum() - np.log(np.diag(others)).sum()
     return float(-0.5 * (error @ error - pulled @ pulled) - spread)
 

@@ -69,8 +69,8 @@ class Marginal:
         """fixed: what every fit has."""
         self.terms, known = tuple(terms), len(fitted.u) + len(fitted.x)
         self._fitted, self._fixed = fitted, tuple(fixed)
-        allowed = sum(f.columns.shape[1] for f in fixed)
-        self._ends = known + np.cumsum([0, allowed, *(f.columns.shape[1] for f in terms)])
+        allowed = sum(f.columns.count for f in fixed)
+        self._ends = known + np.cumsum([0, allowed, *(f.columns.count for f in terms)])
 
         size = int(self._ends[-1])
         self._centre, self._weight = np.zeros(size), np.ones(size)
@@ -339,7 +339,7 @@ class Marginal:
 def _products(fitted: Fitted, terms: Sequence[RandomEffect]) -> Array:
     """Of the derivatives, the columns of all terms, and the residual with one another."""
     own = np.column_stack((fitted.own, fitted.residual))
-    beside = np.concatenate([f.whitened.T @ own for f in terms])
+    beside = np.concatenate([f.whitened.pulled(own) for f in terms])
     square = own.T @ own
     return np.block(
         [

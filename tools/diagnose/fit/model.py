@@ -84,7 +84,7 @@ class Model:
     ) -> tuple[Array, Array]:
         """Of the acting terms begin … end − 1, beside what every fit has; of some names only."""
         nuisance, slack = self.fitted.nuisance, self.fitted.slack
-        ends = np.cumsum([term.columns.shape[1] for term, _ in nuisance.parts])
+        ends = np.cumsum([term.columns.count for term, _ in nuisance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
@@ -92,8 +92,8 @@ class Model:
             if names is not None and term.name not in names:
                 continue
             weights = slack[ends[number - 1] : ends[number]]
-            own = own + size * (term.columns @ weights)
-            whitened = whitened + size * (term.whitened @ weights)
+            own = own + size * term.columns.times(weights)
+            whitened = whitened + size * term.whitened.times(weights)
         return own, whitened
 
     def of_forms(self, name: str) -> Array | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.columns import Columns, joined
 from gritd.tools.diagnose.fit.random_effect import RandomEffect, products
 
 
@@ -33,36 +34,34 @@ class NuisanceColumns:
     @property
     def count(self) -> int:
         """Columns."""
-        return sum(f.columns.shape[1] for f, _ in self.parts)
+        return sum(f.columns.count for f, _ in self.parts)
 
     @property
-    def columns(self) -> Array:
+    def columns(self) -> Columns:
         """(N, t) in the channels' units."""
-        return np.column_stack([size * f.columns for f, size in self.parts])
+        return joined(self._values, [f.columns.scaled(size) for f, size in self.parts])
 
     @property
-    def whitened(self) -> Array:
+    def whitened(self) -> Columns:
         """(N, t)."""
-        return np.column_stack([size * f.whitened for f, size in self.parts])
+        return joined(self._values, [f.whitened.scaled(size) for f, size in self.parts])
 
     @property
-    def carried(self) -> Array:
+    def carried(self) -> Columns:
         """(N, m) in the channels' units: those that are predicted elsewhere too."""
-        none = self.parts[0][0].columns[:, :0]
-        return np.column_stack([none, *(size * f.columns for f, size in self.parts[1:])])
+        return joined(self._values, [f.columns.scaled(size) for f, size in self.parts[1:]])
+
+    @property
+    def _values(self) -> int:
+        """N."""
+        return self.parts[0][0].columns.size
 
     @property
     def gram(self) -> Array:
         """Products (t, t) of the whitened columns."""
-        size = np.concatenate([np.full(f.columns.shape[1], size) for f, size in self.parts])
+        size = np.concatenate([np.full(f.columns.count, size) for f, size in self.parts])
         return np.asarray(products([f for f, _ in self.parts]) * size[:, None] * size)
 
     def pulled(self, values: Array) -> Array:
         """Products (t, …) of the whitened columns with whitened values (N, …)."""
-        return np.concatenate([size * (f.whitened.T @ values) for f, size in self.parts])
-
-    def times(self, weights: Array) -> Array:
-        """What weights (t, …) of the columns amount to (N, …), whitened."""
-        ends = np.cumsum([f.columns.shape[1] for f, _ in self.parts])[:-1]
-        each = zip(self.parts, np.split(weights, ends), strict=True)
-        return np.asarray(sum(size * (f.whitened @ own) for (f, size), own in each))
+        return np.concatenate([size * f.whitened.pulled(values) for f, size in self.parts])

@@ -15,6 +15,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
+from gritd.tools.diagnose.fit.columns import Columns, joined, whole
 from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
@@ -82,9 +83,9 @@ class Fitted:
         return 0.5 * self.objective
 
     @property
-    def jacobian(self) -> Array:
+    def jacobian(self) -> Columns:
         """(N, q + p + t) whitened."""
-        return np.column_stack((self.own, self.nuisance.whitened))
+        return joined(len(self.own), (whole(self.own), self.nuisance.whitened))
 
     @property
     def gram(self) -> Array:
@@ -103,13 +104,8 @@ class Fitted:
 
     def projection(self) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
-        return Projection(self._scaled(), self.residual, self._strain())
-
-    def _scaled(self) -> Array:
-        """Directions (N, q + p + t) in prior σ."""
-        scaled = self.jacobian
-        scaled /= self.penalty
-        return scaled
+        scaled = self.jacobian.scaled(1.0 / self.penalty)
+        return Projection(scaled, self.residual, self._strain())
 
     def _strain(self) -> Array:
         """The fitted unknowns in prior σ (q + p + t,), of what is allowed none: the residual does
@@ -358,8 +354,8 @@ class EffectsObjective:
             moved[i] += step
             raw[:, i] = (self._predicted(moved) - predicted) / step
 
-        for i, (whole, share) in stack.partial.items():
-            raw[:, i] = share * raw[:, whole]
+        for i, (of, share) in stack.partial.items():
+            raw[:, i] = share * raw[:, of]
 
         return np.nan_to_num(raw[:, first:], nan=0.0, posinf=0.0, neginf=0.0)
 

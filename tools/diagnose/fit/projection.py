@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.columns import Columns, columns_of, joined
 from gritd.tools.diagnose.rig.interface import Bools
 
 
@@ -38,27 +39,27 @@ class Projection:
     residual.
     """
 
-    def __init__(self, jacobian: Array, residual: Array, strain: Array) -> None:
+    def __init__(self, jacobian: Columns, residual: Array, strain: Array) -> None:
         """jacobian (N, q) and residual (N,) whitened; strain (q,) the unknowns in prior σ."""
         self.jacobian, self.residual, self.strain = jacobian, residual, strain
-        self._root = np.linalg.cholesky(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
-        self._pulled = self._solved(jacobian.T @ residual - strain)
+        self._root = np.linalg.cholesky(jacobian.products(jacobian) + np.eye(jacobian.count))
+        self._pulled = self._solved(jacobian.pulled(residual) - strain)
 
     def with_columns(self, columns: Array) -> Projection:
         """With more whitened columns (N, m) in the model, each one standard deviation."""
         return Projection(
-            np.column_stack((self.jacobian, columns)),
+            joined(len(columns), (self.jacobian, columns_of(columns))),
             self.residual,
             np.append(self.strain, np.zeros(columns.shape[1])),
         )
 
     def of_rows(self, rows: Bools) -> Projection:
         """As the marked values (N,) alone tell it."""
-        return Projection(self.jacobian * rows[:, None], self.residual * rows, self.strain)
+        return Projection(self.jacobian.of_rows(rows), self.residual * rows, self.strain)
 
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (m, m) and b (m,) of whitened columns (N, m)."""
-        inside = self._solved(self.jacobian.T @ columns)
+        inside = self._solved(self.jacobian.pulled(columns))
         return (
             columns.T @ columns - inside.T @ inside,
             columns.T @ self.residual - inside.T @ self._pulled,
@@ -68,11 +69,8 @@ class Projection:
         """Of a block of columns taken one by one: squares (m,), coordinates in the model's
         directions (q, m), b (m,).
         """
-        columns, jacobian = block.columns.astype(float), self.jacobian[block.rows]
-        acting = np.any(jacobian != 0.0, axis=0)
-        inside = np.zeros((jacobian.shape[1], columns.shape[1]))
-        inside[acting] = jacobian[:, acting].T @ columns
-        inside = self._solved(inside)
+        columns = block.columns.astype(float)
+        inside = self._solved(self.jacobian.pulled(columns, block.rows.start))
 
         b = columns.T @ self.residual[block.rows] - inside.T @ self._pulled
         return np.sum(columns**2, axis=0), inside, b

@@ -14,7 +14,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.fit.columns import Columns, columns_of, whitened
+from gritd.tools.diagnose.noise.colour import Noise
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class RandomEffect:
     """
 
     name: str
-    columns: Array
-    whitened: Array
+    columns: Columns
+    whitened: Columns
     sizes: Sizes
     least: int = 0
     of_form: bool = False
@@ -66,7 +67,8 @@ def random_effect(
     of_form: bool = False,
 ) -> RandomEffect:
     """The term of columns (N, m) in the channels' units."""
-    return RandomEffect(name, columns, whiten(noise, columns), sizes, least, of_form)
+    own = columns_of(columns)
+    return RandomEffect(name, own, whitened(noise, own), sizes, least, of_form)
 
 
 def products(parts: Sequence[RandomEffect]) -> Array:
@@ -90,5 +92,5 @@ _formed: WeakKeyDictionary[RandomEffect, WeakKeyDictionary[RandomEffect, Array]]
 def _between(a: RandomEffect, b: RandomEffect) -> Array:
     known = _formed.setdefault(a, WeakKeyDictionary())
     if b not in known:
-        known[b] = a.whitened.T @ b.whitened
+        known[b] = a.whitened.products(b.whitened)
     return known[b]

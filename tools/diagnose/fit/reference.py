@@ -72,14 +72,14 @@ def left(base: BaseFit) -> Array:
     """What a fit leaves (N,), its terms counted, in the channels' units."""
     fitted = base.fitted
     carried = fitted.nuisance.carried
-    terms = carried @ fitted.slack[fitted.slack.size - carried.shape[1] :]
+    terms = carried.times(fitted.slack[fitted.slack.size - carried.count :])
     return np.asarray(base.problem.stack.measured - fitted.predicted - terms)
 
 
 def _least_noise(rough: BaseFit, shared: Mapping[str, Array], ripples: Array) -> Noise:
     """What no function of the form, no effect and no constant could explain of the reference."""
     stack, before = rough.problem.stack, rough.problem.noise
-    forms = [f.columns for f in form_terms(stack, before)]
+    forms = [f.columns.dense for f in form_terms(stack, before)]
     whole = np.column_stack([ripples, *forms])
     leading = np.column_stack((rough.fitted.raw, *shared.values()))
     predicted = rough.fitted.predicted

@@ -27,7 +27,7 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -69,7 +69,8 @@ def rippling_columns(stack: Stack, residual: Array) -> Array:
     """Cosine and sine (N, m) of the orders that stand out of the reference's residual (N,), of the
     size that they have there; of every run and channel its own.
     """
-    return np.column_stack([np.zeros((stack.size, 0)), *_ripples(stack, residual)])
+    pairs = sorted(_ripples(stack, residual), key=lambda pair: int(np.argmax(np.any(pair, axis=1))))
+    return np.column_stack([np.zeros((stack.size, 0)), *pairs])
 
 
 def without_ripples(stack: Stack, residual: Array, ripples: Array) -> Array:
@@ -106,12 +107,11 @@ def shared_terms(
     """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = even(TUNING.fit.shared_sizes)
     terms = [
-        RandomEffect(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
+        random_effect(_name(part), _reduced(columns, whiten(noise, columns)), noise, sizes)
         for part, columns in shared.items()
     ]
-    if ripples.shape[1]:
-        terms.append(RandomEffect("ripples in both", ripples, whiten(noise, ripples), Sizes()))
-    return tuple(f for f in terms if f.columns.shape[1])
+    terms.append(random_effect("ripples in both", ripples, noise, Sizes()))
+    return tuple(f for f in terms if f.columns.count)
 
 
 def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
@@ -128,15 +128,15 @@ def _name(part: str) -> str:
     return f"{part} in both"
 
 
-def _reduced(columns: Array, whitened: Array) -> tuple[Array, Array]:
+def _reduced(columns: Array, whitened: Array) -> Array:
     """Combinations of columns with the same covariance, the largest first; without those that
     are less than the noise altogether.
     """
     if not columns.shape[1]:
-        return columns, whitened
+        return columns
     values, vectors = np.linalg.eigh(whitened.T @ whitened)
     large = np.flatnonzero(values > TUNING.fit.shared_least)[::-1][: TUNING.fit.shared_most]
-    return columns @ vectors[:, large], whitened @ vectors[:, large]
+    return np.asarray(columns @ vectors[:, large])
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.columns import Columns, joined, whole
 from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
@@ -61,23 +62,21 @@ class Gram:
         """rows: marks the values (N,) that count; if not given, all."""
         forms, others = _terms(model)
         self._fixed = _fixed_columns(problem, model, others)
-        self._form = np.column_stack(
-            [np.zeros((problem.stack.size, 0)), *(f.whitened for f in forms)]
-        )
+        self._form = joined(problem.stack.size, [f.whitened for f in forms])
         self._forms, self._residual = forms, model.fitted.residual
         if rows is not None:
-            self._fixed, self._form = self._fixed * rows[:, None], self._form * rows[:, None]
+            self._fixed, self._form = self._fixed.of_rows(rows), self._form.of_rows(rows)
             self._residual = self._residual * rows
 
         self._root = _root(self._fixed)
-        strain = np.zeros(self._fixed.shape[1])
+        strain = np.zeros(self._fixed.count)
         known = model.fitted.centre.size
         strain[:known] = model.fitted.centre * model.fitted.penalty[:known]
-        self._pulled = _solved(self._root, self._fixed.T @ self._residual - strain)
-        self._inside = _solved(self._root, self._fixed.T @ self._form)
+        self._pulled = _solved(self._root, self._fixed.pulled(self._residual) - strain)
+        self._inside = _solved(self._root, self._fixed.products(self._form))
 
-        gram = self._form.T @ self._form - self._inside.T @ self._inside
-        score = self._form.T @ self._residual - self._inside.T @ self._pulled
+        gram = self._form.products(self._form) - self._inside.T @ self._inside
+        score = self._form.pulled(self._residual) - self._inside.T @ self._pulled
         misfit = self._residual @ self._residual + strain @ strain - self._pulled @ self._pulled
         alone = -0.5 * float(misfit) - float(np.log(np.diag(self._root)).sum())
         self.sizes = [_sized(gram, score, alone, forms, chosen) for chosen in _about(model, forms)]
@@ -110,10 +109,10 @@ class Gram:
 
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (s, m, m) and b (s, m) of whitened columns (N, m) for each of the sizes."""
-        inside = _solved(self._root, self._fixed.T @ columns)
+        inside = _solved(self._root, self._fixed.pulled(columns))
         squares = columns.T @ columns - inside.T @ inside
         scores = columns.T @ self._residual - inside.T @ self._pulled
-        shared = self._form.T @ columns - self._inside.T @ inside
+        shared = self._form.pulled(columns) - self._inside.T @ inside
 
         turned = [one.solved(shared) for one in self.sizes]
         a = np.stack([squares - v.T @ v for v in turned])
@@ -133,19 +132,20 @@ def _terms(model: Model) -> tuple[Sequence[RandomEffect], Sequence[tuple[RandomE
 
 def _fixed_columns(
     problem: Problem, model: Model, others: Sequence[tuple[RandomEffect, float]]
-) -> Array:
+) -> Columns:
     """All but δ (N, q), each one standard deviation."""
     fitted = model.fitted
-    own = fitted.own / fitted.penalty[: fitted.centre.size]
+    own = whole(fitted.own / fitted.penalty[: fitted.centre.size])
     allowed = [f.whitened for f in problem.fixed]
-    return np.column_stack((own, *allowed, *(size * f.whitened for f, size in others)))
+    more = [f.whitened.scaled(size) for f, size in others]
+    return joined(problem.stack.size, (own, *allowed, *more))
 
 
 def _sized(
     gram: Array, score: Array, alone: float, forms: Sequence[RandomEffect], chosen: Chosen
 ) -> Sized:
     values = [f.sizes.values[n] for f, n in zip(forms, chosen, strict=True)]
-    widths = [f.columns.shape[1] for f in forms]
+    widths = [f.columns.count for f in forms]
     every = np.repeat(np.array(values), widths)
     acting = np.flatnonzero(every)
     size = every[acting]
@@ -176,9 +176,9 @@ def _about(model: Model, forms: Sequence[RandomEffect]) -> list[Chosen]:
     return list(dict.fromkeys([chosen, *alone, *steps]))
 
 
-def _root(columns: Array) -> Array:
+def _root(columns: Columns) -> Array:
     """Cholesky root (q, q) of the products of columns (N, q) and their unit prior."""
-    gram = columns.T @ columns
+    gram = columns.products(columns)
     gram[np.diag_indices_from(gram)] += 1.0
     return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 

@@ -79,8 +79,8 @@ class OpenNoise:
         base = np.column_stack(
             (
                 fitted.raw / fitted.penalty[: len(centre)],
-                problem.nuisance.columns,
-                fitted.nuisance.carried,
+                problem.nuisance.columns.dense,
+                fitted.nuisance.carried.dense,
             )
         )
         y = stack.measured - fitted.predicted + fitted.raw @ centre

@@ -70,7 +70,7 @@ def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     plain = stack.predict(np.zeros(len(stack.rig.constants)), ())
     added = fitted.predicted - plain
     building = added * np.exp(-_rolled(stack) / 1.0)
-    every = np.column_stack((term.columns, fitted.raw[:, len(fitted.u) :]))
+    every = np.column_stack((term.columns.dense, fitted.raw[:, len(fitted.u) :]))
     left = building - every @ np.linalg.lstsq(every, building, rcond=None)[0]
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(building)) == follows
 
@@ -106,7 +106,7 @@ def _drifting(zero: np.ndarray) -> float:
     fitted = problem.descend((effect,), free, none, start, rounds=0)
 
     terms = form_errors(stack, problem.noise, fitted)
-    every = np.column_stack([*(f.columns for f in terms), fitted.raw[:, len(none) :]])
+    every = np.column_stack([*(f.columns.dense for f in terms), fitted.raw[:, len(none) :]])
     drift = np.where(stack.of("drawbar_pull"), zero, 0.0)
     left = drift - every @ np.linalg.lstsq(every, drift, rcond=None)[0]
     return float(np.linalg.norm(left) / np.linalg.norm(drift))
@@ -158,7 +158,7 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
 
     names = [constant.name for constant in stack.rig.constants]
     slipping = fitted.raw[:, names.index(stack.rig.slipping)]
-    every = np.column_stack((term.columns, fitted.raw[:, len(fitted.u) :]))
+    every = np.column_stack((term.columns.dense, fitted.raw[:, len(fitted.u) :]))
     left = slipping - every @ np.linalg.lstsq(every, slipping, rcond=None)[0]
     taken = np.linalg.norm(left) < 1e-6 * np.linalg.norm(slipping)
     assert taken == slips
@@ -183,7 +183,7 @@ def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool)
     along = (place - place.min()) / np.ptp(place)
     added = fitted.predicted - stack.predict(still, ())
     wavy = 0.3 * added * np.cos(20.0 * np.pi * along)
-    every = np.column_stack([*(f.columns for f in terms), fitted.raw[:, len(still) :]])
+    every = np.column_stack([*(f.columns.dense for f in terms), fitted.raw[:, len(still) :]])
     left = wavy - every @ np.linalg.lstsq(every, wavy, rcond=None)[0]
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(wavy)) == placed
 
@@ -217,13 +217,13 @@ def test_no_law_says_what_profile_a_hub_has() -> None:
     profiles = [
         f
         for f in form_errors(stack, problem.noise, fitted)
-        if f.columns.shape[1] == 2 * TUNING.fit.harmonics
+        if f.columns.count == 2 * TUNING.fit.harmonics
     ]
     assert [f.sizes.values[-1] for f in profiles] == [2.0]
 
     added = fitted.predicted - stack.predict(start[0], ())
     third = np.abs(added).max() * np.cos(3.0 * stack.covariate("wheel_angle")) * (added != 0.0)
-    columns = np.column_stack((profiles[0].columns, fitted.raw[:, len(start[0]) :]))
+    columns = np.column_stack((profiles[0].columns.dense, fitted.raw[:, len(start[0]) :]))
     left = third - columns @ np.linalg.lstsq(columns, third, rcond=None)[0]
     assert np.linalg.norm(left) < 0.15 * np.linalg.norm(third)
 
@@ -246,7 +246,7 @@ def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_n
 
     shown = {f.parameter.name: Uncertain(f.value(1.0), f.parameter.sigma) for f in free}
     rig = plain.stack.rig.having((ConfiguredEffect("bulldozing", shown),))
-    had = Problem(Stack(rig), plain.noise, plain.fixed[0].columns)
+    had = Problem(Stack(rig), plain.noise, plain.fixed[0].columns.dense)
     as_had = had.descend((), (), np.zeros(len(rig.constants)), np.zeros(0), rounds=0)
     np.testing.assert_allclose(as_had.predicted, as_new.predicted, rtol=1e-6, atol=1e-6)
 
@@ -255,8 +255,8 @@ def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_n
     assert [f.name for f in theirs] == [f.name for f in ours]
     for one, other in zip(ours, theirs, strict=True):
         assert one.sizes == other.sizes and one.least == other.least
-        scale = np.linalg.norm(one.columns)
-        np.testing.assert_allclose(other.columns, one.columns, atol=1e-4 * scale)
+        scale = np.linalg.norm(one.columns.dense)
+        np.testing.assert_allclose(other.columns.dense, one.columns.dense, atol=1e-4 * scale)
 
 
 def test_a_rig_without_a_reference_has_none_of_it() -> None:

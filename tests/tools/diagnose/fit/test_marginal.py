@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import EFFECTS
+from gritd.tools.diagnose.fit.columns import whole
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
@@ -26,8 +27,8 @@ def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
     free = free_of(effects)
     jacobian, tolerance = rng.standard_normal((N, 1 + len(free))), rng.standard_normal((N, 2))
     columns = [rng.standard_normal((N, m)) for m in (3, 5)]
-    terms = [RandomEffect(str(c.shape), c, c, SIZES) for c in columns]
-    fixed = RandomEffect("tolerance", tolerance, tolerance, Sizes())
+    terms = [RandomEffect(str(c.shape), whole(c), whole(c), SIZES) for c in columns]
+    fixed = RandomEffect("tolerance", whole(tolerance), whole(tolerance), Sizes())
     residual, at = rng.standard_normal(N) * 2.0, rng.standard_normal(1 + len(free))
     fitted = Fitted(
         effects,
@@ -42,7 +43,7 @@ def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
         np.zeros(2),
         0.0,
         NuisanceColumns(((fixed, 1.0),)),
-        fixed.whitened.T @ jacobian,
+        fixed.whitened.pulled(jacobian),
         np.zeros(jacobian.shape[1]),
         np.eye(jacobian.shape[1]),
         np.zeros(jacobian.shape[1], bool),

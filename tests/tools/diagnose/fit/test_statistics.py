@@ -16,6 +16,7 @@ from scipy.stats import norm
 from gritd.estimator.compiled import whitening
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import plain
+from gritd.tools.diagnose.fit.columns import whole
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import (
@@ -217,8 +218,8 @@ def test_strain_against_the_prior_is_evidence() -> None:
     direction /= np.linalg.norm(direction)
     jacobian = 100.0 * direction[:, None]  # the constant moves the data by 100 σ per prior σ
     residual = rng.standard_normal(400) * 0.01
-    strained = Projection(jacobian, residual, np.array([5.0]))  # pulled five prior σ off
-    relaxed = Projection(jacobian, residual, np.array([0.0]))
+    strained = Projection(whole(jacobian), residual, np.array([5.0]))  # pulled five prior σ off
+    relaxed = Projection(whole(jacobian), residual, np.array([0.0]))
     column = 300.0 * direction[:, None]
     assert log_bayes(*strained.project(column), (0,)) > 5.0
     assert log_bayes(*relaxed.project(column), (0,)) < 0.0

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.effects import make
+from gritd.tools.diagnose.fit.columns import whole
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_bayes_alone
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.method import fit_base
@@ -41,13 +42,13 @@ def test_columns_are_judged_beside_a_discrepancy_of_each_size(which: int) -> Non
     assert bare.marginal is not None
     fitted, chosen = bare.fitted, gram.sizes[which].chosen
     sized = zip(bare.marginal.terms, chosen, strict=True)
-    forms = [f.sizes.values[number] * f.whitened for f, number in sized]
+    forms = [f.sizes.values[number] * f.whitened.dense for f, number in sized]
     own = fitted.own / fitted.penalty[: fitted.centre.size]
-    jacobian = np.column_stack((own, *(f.whitened for f in problem.fixed), *forms))
+    jacobian = np.column_stack((own, *(f.whitened.dense for f in problem.fixed), *forms))
     strain = np.zeros(jacobian.shape[1])
     strain[: fitted.centre.size] = fitted.centre * fitted.penalty[: fitted.centre.size]
 
-    expected = Projection(jacobian, fitted.residual, strain).project(columns)
+    expected = Projection(whole(jacobian), fitted.residual, strain).project(columns)
     np.testing.assert_allclose(a[which], expected[0], rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(b[which], expected[1], rtol=1e-6, atol=1e-5)
 

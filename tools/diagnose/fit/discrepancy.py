@@ -129,9 +129,10 @@ def _features(stack: Stack, source: FormSource, acting: Bools) -> Array:
     known = _formed.setdefault(stack, {})
     if source.name not in known:
         conditions = conditions_at(stack, source)[acting]
-        fit = TUNING.fit
-        most = fit.form_features_shared if stack.referred else fit.form_features
-        known[source.name] = features_of(conditions, most, fit.form_left_out).at(conditions)
+        shared = stack.referred
+        most = TUNING.fit.form_features_shared if shared else TUNING.fit.form_features
+        features = features_of(conditions, most, TUNING.fit.form_left_out)
+        known[source.name] = features.at(conditions)
     return known[source.name]
 
 

@@ -16,6 +16,7 @@ from scipy.stats import norm
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.cli.command import CommandError
+from gritd.tools.diagnose.fit.columns import whole
 from gritd.tools.diagnose.fit.evidence import strength_sizes
 from gritd.tools.diagnose.fit.form_error import form_error_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
@@ -263,7 +264,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     residual = values - jacobian @ at
     objective = float(residual @ residual + np.sum((penalty * at) ** 2))
     none = np.zeros((30, 0))
-    fixed = RandomEffect("nothing", none, none, Sizes())
+    fixed = RandomEffect("nothing", whole(none), whole(none), Sizes())
     fitted = Fitted(
         (effect,),
         free,

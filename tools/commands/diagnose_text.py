@@ -42,7 +42,9 @@ def text(diagnosis: Diagnosis) -> str:
     if diagnosis.next_experiment is not None:
         following = diagnosis.next_experiment
         lines.append(f"  next: {following.action}{_foreseen(following, diagnosis.verdict)}")
-    lines += [diagnosis.remaining_words, *(f"note: {c}" for c in diagnosis.caveats)]
+    if diagnosis.verdict != "unlisted":  # there all of the misfit remains
+        lines.append(diagnosis.remaining_words)
+    lines += (f"note: {c}" for c in diagnosis.caveats)
     return "\n".join(map(visible, lines))
 
 

@@ -4,16 +4,14 @@ it was made from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from gritd.tools.cli.wording import listed, number, percent, shown
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, SoilFit
 from gritd.tools.report import masthead, tables
 from gritd.tools.report.html import Markup, tag
-from gritd.tools.report.hypotheses import in_order
 from gritd.tools.report.words import (
     counted,
-    either,
     held,
     name_of,
     nats,
@@ -38,8 +36,7 @@ def verdict(diagnosis: Diagnosis) -> Markup:
     """The verdict in one paragraph, the numbers behind it, and of which rig and day it is."""
     name, meaning = VERDICTS[diagnosis.verdict]
     explained = diagnosis.verdict == "explained"
-    equals = [simplest_first(diagnosis, h) for h in diagnosis.accepted] if explained else []
-    effects = [_or_alike(group) for group in equals]
+    effects = [_or_alike(h) for h in diagnosis.accepted] if explained else []
     title = f"{name}: {listed(effects)}" if effects else name
 
     runs = {trace.run for trace in diagnosis.traces}
@@ -48,7 +45,6 @@ def verdict(diagnosis: Diagnosis) -> Markup:
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
-        _equals(equals),
         tag("p", held(tables.named(diagnosis, diagnosis.summary)), class_="summary"),
         tag("dl", (_figure(*figure) for figure in _figures(diagnosis)), class_="figures"),
         masthead.masthead(diagnosis.redo.get(RIG, ""), diagnosis.redo.get(RUNS, ()))
@@ -74,31 +70,8 @@ def explanation(diagnosis: Diagnosis) -> str:
     return "the empirical law" if diagnosis.law else "it"
 
 
-def simplest_first(diagnosis: Diagnosis, h: Hypothesis) -> list[Hypothesis]:
-    """An effect and those that the recordings cannot tell it from: of those that are as probable,
-    the one with the fewest parameters first.
-    """
-    known = {other.effect: other for other in diagnosis.hypotheses}
-    group = [h, *(known[n] for n in h.indistinguishable_from if n in known)]
-    return in_order(group)
-
-
-def _or_alike(group: Sequence[Hypothesis]) -> str:
-    return name_of(group[0].effect) + " or similar" * (len(group) > 1)
-
-
-def _equals(of: Sequence[Sequence[Hypothesis]]) -> Markup | None:
-    """What is accepted, a line each, with all that it cannot be distinguished from; None where
-    nothing is alike.
-    """
-    if not any(len(group) > 1 for group in of):
-        return None
-    return tag("ul", (tag("li", _line(group)) for group in of), class_="equals")
-
-
-def _line(group: Sequence[Hypothesis]) -> str:
-    names = either([f"{name_of(h.effect)} ({percent(h.probability)})" for h in group])
-    return held(names) + ": not distinguished by these recordings" * (len(group) > 1)
+def _or_alike(h: Hypothesis) -> str:
+    return name_of(h.effect) + " or similar" * bool(h.indistinguishable_from)
 
 
 def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
@@ -112,11 +85,7 @@ def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
 def _accepted(diagnosis: Diagnosis, h: Hypothesis) -> tuple[str, str, str]:
     """An effect or an undistinguished group, with its probability and its strength."""
     parameters = "; ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.known.items())
-    group = simplest_first(diagnosis, h)
-    if len(group) == 1:
-        return name_of(h.effect), f"{percent(h.probability)} probable", parameters
-    together = f"{percent(_together(diagnosis, h))} probable"
-    return _or_alike(group), together, f"{name_of(h.effect)}: {parameters}"
+    return _or_alike(h), f"{percent(_together(diagnosis, h))} probable", parameters
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:

@@ -15,7 +15,6 @@ from gritd.tools.report.words import counted, held, name_of, nats
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
 TIE = 2  # decimals of a probability: effects that differ by less are as probable
-EQUAL = 0.5  # of the largest probability: so much of it is as probable, in a group
 
 
 def introduction(diagnosis: Diagnosis) -> str:
@@ -54,26 +53,13 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         groups.append([o for g in joined for o in g] + [h])
 
     order = {h.effect: _rank(h, place) for place, h in enumerate(of)}
-    ranked = sorted(groups, key=lambda g: min(order[h.effect] for h in g))
-    return [in_order(group) for group in ranked]
+    ranked = [sorted(group, key=lambda h: order[h.effect]) for group in groups]
+    return sorted(ranked, key=lambda group: order[group[0].effect])
 
 
 def _rank(h: Hypothesis, place: int) -> tuple[bool, float, int, int]:
     """Accepted ones first, then the likelier; in a tie the simpler, which has fewer parameters."""
     return not h.accepted, -round(h.probability, TIE), len(h.parameters), place
-
-
-def in_order(group: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Of effects that are not distinguished, those that are as probable as the likeliest first, and
-    of these the one with the fewest parameters; the others by their probability.
-    """
-    least = EQUAL * max(h.probability for h in group)
-
-    def rank(h: Hypothesis) -> tuple[bool, int, float]:
-        equal = h.probability >= least
-        return not equal, len(h.parameters) * equal, -h.probability
-
-    return sorted(group, key=rank)
 
 
 def named(of: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -97,11 +97,6 @@ def nats(value: float | None) -> str:
     )
 
 
-def either(names: list[str]) -> str:
-    """a; a or b; a, b or c."""
-    return " or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
-
-
 def counted(count: int, what: str) -> str:
     """1 run, 2 runs."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

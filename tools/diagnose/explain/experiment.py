@@ -11,33 +11,48 @@ lives is stepped.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import hypot
 
 import numpy as np
 
 from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain.result import Location, NextExperiment
+from gritd.tools.diagnose.explain.result import Discrepancy, Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.rig.interface import Foreseen, Rig
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
 from gritd.tools.diagnose.verdict.decide import shown
 from gritd.tools.diagnose.verdict.decision import Decision
 
+State = tuple[Array, Sequence[Effect]]  # constants u (q,), effects as fitted
+
 
 def next_experiment(
-    search: EffectSearch, decision: Decision, location: Sequence[Location]
+    search: EffectSearch,
+    decision: Decision,
+    location: Sequence[Location],
+    forms: Mapping[str, Discrepancy],
 ) -> NextExperiment | None:
-    """None where model and recordings agree, or one explanation stands alone."""
+    """None where model and recordings agree, or one explanation stands alone. forms: how far the
+    form of the model may be off in each channel: no rival predicts an experiment better.
+    """
+    sigmas = _sigmas(search, forms)
     if decision.verdict == "insufficient":
-        return _most_shown(search)
+        return _most_shown(search, sigmas)
     if decision.verdict == "unlisted":
         return _along_misfit(search.problem.stack.rig, location, _mistaken(decision))
 
     rivals = _rivals(search, decision)
-    return _between(search, rivals) if len(rivals) > 1 else None
+    return _between(search, rivals, sigmas) if len(rivals) > 1 else None
+
+
+def _sigmas(search: EffectSearch, forms: Mapping[str, Discrepancy]) -> dict[str, float]:
+    """Of each channel, by how much a prediction of one value may be off, noise included."""
+    colours = zip(search.problem.stack.rig.channels, search.problem.noise.colours, strict=True)
+    return {channel: hypot(colour.sigma, forms[channel].size) for channel, colour in colours}
 
 
 def _proposed(key: str, gain: float, separates: tuple[str, ...]) -> NextExperiment:
@@ -55,14 +70,18 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.shown] if best.names else []
 
 
-def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
+def _between(
+    search: EffectSearch, rivals: list[Model], sigmas: Mapping[str, float]
+) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     rig = search.problem.stack.rig
     first, *others = (m.fitted for m in rivals)
-    each = [(m.u, m.acting) for m in others]
-    gains = {k: _gains(search, k, first.u, first.acting, each) for k in rig.words.menu.driven}
-    told = {k: [m for m, nats in zip(rivals[1:], of, strict=True) if nats >= TUNING.screen.sure]
-            for k, of in gains.items()}  # fmt: skip
+    one, each = (first.u, first.acting), [(m.u, m.acting) for m in others]
+    gains = {k: _gains(search, sigmas, k, one, each) for k in rig.words.menu.driven}
+    told = {}
+    for key, of in gains.items():
+        pairs = zip(rivals[1:], of, strict=True)
+        told[key] = [rival for rival, nats in pairs if nats >= TUNING.screen.sure]
 
     best = max(told, key=lambda k: len(told[k]), default="")
     if best and told[best]:
@@ -86,14 +105,15 @@ def _by_hand(rig: Rig, names: tuple[str, ...]) -> NextExperiment | None:
 # ---- insufficient, and not in the list ---------------------------------------------------------
 
 
-def _most_shown(search: EffectSearch) -> NextExperiment | None:
+def _most_shown(search: EffectSearch, sigmas: Mapping[str, float]) -> NextExperiment | None:
     """The experiment with the largest median gain over the effects that these recordings could not
     show, and those that it would show.
     """
     rig, u, seen = search.problem.stack.rig, search.base.fitted.u, shown(search, search.first)
     unseen = {name: _expected(effect) for name, effect in rig.effects.items() if name not in seen}
-    each = [(u, (one,)) for one in unseen.values()]
-    gains = {key: _gains(search, key, u, (), each) for key in rig.words.menu.driven if unseen}
+    each: list[State] = [(u, (one,)) for one in unseen.values()]
+    driven = rig.words.menu.driven if unseen else ()
+    gains = {key: _gains(search, sigmas, key, (u, ()), each) for key in driven}
 
     median = {key: float(np.median(of)) for key, of in gains.items()}
     best = max(median, key=lambda k: median[k], default="")
@@ -134,21 +154,21 @@ def _along_misfit(
 
 def _gains(
     search: EffectSearch,
+    sigmas: Mapping[str, float],
     key: str,
-    u: Array,
-    acting: Sequence[Effect],
-    others: Sequence[tuple[Array, Sequence[Effect]]],
+    one: State,
+    others: Sequence[State],
 ) -> list[float]:
-    """What an experiment is expected to tell between constants u (q,) with effects, and each of
-    some others [nats]: half the squared change of what is foreseen in units of noise, the soil's
-    uncertainty among it.
+    """What an experiment is expected to tell between one state and each of some others [nats]: half
+    the squared change of what is foreseen in units of sigmas, the soil's uncertainty among it.
     """
-    rig = search.problem.stack.rig
+    rig, (u, acting) = search.problem.stack.rig, one
     here = rig.foresee(key, u, acting)
-    scale = _noise(search, here)
+    scale = _values({c: np.where(here.tells[c], sigmas[c], np.inf) for c in here.channels})
 
     def changed(at: Array, effects: Sequence[Effect]) -> Array:
-        return np.nan_to_num(_values(rig.foresee(key, at, effects)) - _values(here)) / scale
+        there = rig.foresee(key, at, effects)
+        return np.nan_to_num(_values(there.channels) - _values(here.channels)) / scale
 
     step, soil = TUNING.fit.derivative_steps[1], []
     for i, constant in enumerate(rig.constants):
@@ -166,16 +186,6 @@ def _gains(
     return gains
 
 
-def _values(foreseen: Foreseen) -> Array:
+def _values(channels: Mapping[str, Array]) -> Array:
     """One value a second of every channel: neighbours share their noise."""
-    return np.concatenate([v[:: round(TUNING.rig.rate)] for v in foreseen.channels.values()])
-
-
-def _noise(search: EffectSearch, here: Foreseen) -> Array:
-    """Standard deviation of each of these values; infinite where a channel tells nothing."""
-    stack, sigmas = search.problem.stack, {}
-    for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
-        usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
-        sigma = np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual)
-        sigmas[channel] = np.where(here.tells[channel], sigma, np.inf)
-    return _values(Foreseen(sigmas, here.tells))
+    return np.concatenate([values[:: round(TUNING.rig.rate)] for values in channels.values()])

@@ -9,7 +9,7 @@ from typing import Any
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.parallel import meanwhile
-from gritd.tools.cli.wording import listed, sigmas
+from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
@@ -58,7 +58,8 @@ def explain(
         soil = soil_of(problem, base.fitted, decision)
         learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
         location = located()
-    proposed = next_experiment(search, decision, location)
+    forms = discrepancies(problem, accepted)
+    proposed = next_experiment(search, decision, location, forms)
 
     unlisted = decision.verdict == "unlisted"
     law = find_law(search, location, soil, after) if unlisted else None
@@ -76,8 +77,8 @@ def explain(
         caveats=_caveats(problem, accepted, whole, redo, search.failed, location),
         share=decision.share,
         remaining=left,
-        remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),
-        discrepancy=discrepancies(problem, accepted),
+        remaining_words=_remaining(decision, bool(strains(rig, accepted)), left, bool(rig.forms)),
+        discrepancy=forms,
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
         reference=None,
@@ -125,7 +126,7 @@ def _hypotheses(
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
     out = []
-    for name, probability in _ranked(search, decision)[: TUNING.explain.shown_hypotheses]:
+    for name, probability in _ranked(search, decision):
         models = [m for m in search.models if name in m.names]
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
@@ -270,28 +271,22 @@ def _caveats(
 
 
 def _remaining(
-    decision: Decision,
-    strained: Sequence[tuple[str, float]],
-    left: Mapping[str, Remainder],
-    formed: bool,
+    decision: Decision, strained: bool, left: Mapping[str, Remainder], formed: bool
 ) -> str:
-    """strained: constants far from what is known of them [σ]: where nothing else remains, they hold
-    what does; left: what the equations and the accepted names miss of each channel; formed: whether
-    the rig has a discrepancy of form.
+    """strained: whether constants are far from what is known of them; left: what the equations and
+    the accepted names miss of each channel; formed: whether the rig has a discrepancy of form.
     """
-    if decision.beside is None and strained:
-        held = listed([f"{name} ({sigmas(strain)})" for name, strain in strained])
-        return f"What remains is in constants far from what is known of them: {held}."
+    if decision.beside is not None:
+        kinds = dict.fromkeys(described(f.shape) for f in decision.beside.functions)
+        return f"Something without a name remains: {', '.join(kinds)}."
 
     quiet = decision.verdict in ("consistent", "insufficient")
     missed = [words for c, each in left.items() if (words := missed_words(c, each, not quiet))]
-    if decision.beside is None and missed:
+    if missed:
         without = "Without its discrepancy of form, the model" if formed else "The model"
         return f"{without} misses {listed(missed)}."
-    if decision.beside is None and decision.verdict == "unlisted":
+    if strained:
+        return "Nothing above the noise remains but what strained constants take up."
+    if decision.verdict == "unlisted":
         return "Soil and calibration can take up the misfit, within what is known of them."
-    if decision.beside is None:
-        return "Nothing above the noise remains."
-
-    kinds = ", ".join(dict.fromkeys(described(f.shape) for f in decision.beside.functions))
-    return f"Something without a name remains: {kinds}."
+    return "Nothing above the noise remains."

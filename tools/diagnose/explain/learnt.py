@@ -33,18 +33,17 @@ from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import HAD, Bools, FormSource, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SPAN
+from gritd.tools.diagnose.tuning.guards import RIDGE, SPAN
 
 WHEN = ("delay", "blur")  # kinds of constants that move a channel in time
 
 
 @dataclass(frozen=True)
 class _Source:
-    """One channel's δ where it acts: conditions (n, d), features (n, m), and as a linear map
-    (n, w) of the unknowns, in sizes.
+    """One channel's δ where it acts: features (n, m), and as a linear map (n, w) of the unknowns,
+    in sizes.
     """
 
-    conditions: Array
     features: Array
     map: Array
     start: Array  # (n,) what the configuration held already
@@ -155,7 +154,7 @@ def _source(
     features = solve_triangular(root, covariance(conditions, points).T, lower=True).T
     held = stack.rig.held
     start = np.zeros(len(scale)) if held is None else stack.joined(held.means)[rows] / scale
-    return _Source(conditions, features, whole / scale[:, None], start, size, usual)
+    return _Source(features, whole / scale[:, None], start, size, usual)
 
 
 def _calibration(rig: Rig) -> list[int]:
@@ -190,9 +189,7 @@ class _Reduced:
         root = _root(list(parts.values()))
         values, vectors = np.linalg.eigh(root @ self._map @ spread @ self._map.T @ root.T)
         values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1]
-        left = 1.0 - np.cumsum(values) / values.sum()
-        count = int(np.sum(left > TUNING.explain.learnt_left_out)) + 1
-        count = min(count, TUNING.explain.learnt_directions, int(np.sum(values > 0.0)))
+        count = min(int(np.sum(values > RIDGE * values[0])), TUNING.explain.learnt_directions)
         sigmas = np.sqrt(values[:count])
         self.directions = np.linalg.solve(root, vectors[:, :count] * sigmas)  # (f, r)
         self.beside = shared.T @ root.T @ vectors[:, :count] / sigmas  # (soil, r) correlations

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from gritd.estimator.effects.base import Effect, order_of
+from gritd.estimator.effects.base import Effect
 from gritd.tools.cli.wording import shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import Ripple
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.verdict.resemblance import ripples_a_turn
 
 ALONG = {"angle": "1/turn", "time": "Hz"}
 
@@ -47,7 +48,7 @@ def left_over(rig: Rig, accepted: Sequence[Effect], places: Collection[str] = ()
             f" {rig.lines.aligned:.2f} a turn aligned the runs."
         )
 
-    named = [order for effect in accepted if (order := _order(effect)) is not None]
+    named = [order for effect in accepted if (order := ripples_a_turn(effect)) is not None]
     ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
     if ripples:
         yield f"The wheel ripples, and no accepted effect does: {_listed(rig, ripples)}."
@@ -77,14 +78,6 @@ def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:
 def _size(rig: Rig, line: SpectralLine) -> str:
     unit, factor = shown(rig.units[line.channel])
     return spaced(line.size * factor, unit, 2)
-
-
-def _order(effect: Effect) -> float | None:
-    """Ripples a turn of an effect."""
-    if effect.fingerprint.covariate != "wheel_angle":
-        return None
-    name = order_of(type(effect))
-    return float(getattr(effect, name)) if name else 1.0
 
 
 def _taken(line: SpectralLine, orders: Sequence[float]) -> bool:

@@ -128,8 +128,11 @@ def _resembling(decision: Decision, of: Resembled, rivals: Sequence[str]) -> str
     how = f" if its formula is bent by {percent(of.forms)}" if round(of.forms, 2) > 0.0 else ""
     if not of.predicts:
         how = ", but unseen runs are predicted worse with it"
+    share = percent(of.share)
+    if share == percent(0.0):
+        share, how = "none", " by our formula"
     where = PLACE_OF[EFFECTS[of.name].stage]
-    taken = f"takes {percent(of.share)} of the misfit{how}: probably something else in {where}."
+    taken = f"takes {share} of the misfit{how}: probably something else in {where}."
     if not rivals:
         return f"It resembles {_likely(decision, of.name)}, which {taken}"
     alike = ", ".join(_likely(decision, name) for name in (of.name, *rivals))

@@ -51,7 +51,7 @@ def _spread(values: Array, used: Bools) -> list[float]:
 
 def _digits(values: Array) -> list[float]:
     """As many digits as a picture shows, and some more: a file of them is half as large."""
-    return [float(f"{value:.{TUNING.explain.digits}g}") for value in values.tolist()]
+    return [float(f"{value:.6g}") for value in values.tolist()]
 
 
 def scatters(

@@ -77,10 +77,7 @@ def sentence(
         words = here.between(shape)
     else:
         ways = {"run": here.runs, "constant": here.everywhere, "direction": here.directions}
-        if len(shape.along) > 1:
-            words = here.corner(shape.along)
-        else:
-            words = ways[covariate]() if covariate in ways else here.along(covariate)
+        words = ways[covariate]() if covariate in ways else here.along(covariate)
     return _started(f"{spelled(shape.channel)}, {words}; {percent(share)} of its misfit")
 
 
@@ -186,25 +183,6 @@ class _Where:
         first, *rest = (self._say((low, middle, high)[k]) for k in shown)
         others = (f"{_brief(say)} at {v}" for say, v in zip(rest, at[1:], strict=True))
         return ", ".join([f"{first} at {AT.get(covariate, '{}').format(at[0])}", *others])
-
-    def corner(self, names: Sequence[str]) -> str:
-        """Where two covariates are in their upper or lower thirds, the corner that is farthest
-        off.
-        """
-        corners = [self._own]
-        for name in names:
-            x = self._stack.covariate(name)
-            low, high = np.quantile(x[self._own], (1.0 / 3.0, 2.0 / 3.0))
-            corners = [part & third for part in corners for third in (x <= low, x >= high)]
-        corners = [c for c in corners if c.any() and (self._own & ~c).any()]
-        if not corners:
-            return self.along(names[0])
-        inside = max(corners, key=lambda c: abs(self._mean(c)))
-        at = [
-            value_of(self._stack, n, float(self._stack.covariate(n)[inside].mean())) for n in names
-        ]
-        elsewhere = _brief(self._say(self._mean(self._own & ~inside)))
-        return f"at {' and '.join(at)} {self._say(self._mean(inside))}, elsewhere {elsewhere}"
 
     def _apart(self, covariate: str, values: Sequence[float]) -> list[str]:
         """Values of a covariate, to a hundredth of what they differ by, or as whole numbers."""

@@ -18,14 +18,8 @@ class Explain:
     doubtful: float = tuned(3.0, "σ", "from what is known, or times the stated noise: reported")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is reported")
 
-    # --- experiment.py ---
-    foreseen_error: float = tuned(
-        0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
-    )
-
     # --- explanation.py ---
     shown: int = tuned(4, "lines, runs, or scatters", "that are shown of many")
-    shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
 
     # --- reconciled.py ---
     stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off", "judgement")
@@ -40,17 +34,11 @@ class Explain:
     # --- locate.py ---
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
 
-    # --- traces.py ---
-    digits: int = tuned(6, "digits", "of what is drawn", "size of the JSON")
-
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")
     learnt_directions: int = tuned(8, "directions", "at most: a configuration stays readable")
     learnt_places: int = tuned(
         4, "decimals", "of means; directions and correlations have one less, points two"
-    )
-    learnt_left_out: float = tuned(
-        1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
     )
     learnt_ridge: float = tuned(1e-4, "-", "of the features' squares, against rounding")
     learnt_beyond: float = tuned(

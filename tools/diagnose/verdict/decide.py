@@ -131,7 +131,7 @@ def judged(
         tuple(
             Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
             for name in best.names
-            if name not in named.names and _likely(_weight(every, best))
+            if name not in named.names and _likely(_together(every)[frozenset(best.names)])
         ),
     )
 
@@ -199,11 +199,6 @@ def _together(weighed: Sequence[WeighedExplanation]) -> dict[frozenset[str], flo
         of = frozenset(w.names)
         out[of] = out.get(of, 0.0) + w.probability
     return out
-
-
-def _weight(weighed: Sequence[WeighedExplanation], of: WeighedExplanation) -> float:
-    """Probability of the set of effects of an explanation, resembled or there."""
-    return _together(weighed)[frozenset(of.names)]
 
 
 def _trust(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> dict[str, float]:

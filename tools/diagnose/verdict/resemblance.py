@@ -59,8 +59,13 @@ def _likelihood(rig: Rig, model: Model, name: str) -> Array:
 
 def _has_line(rig: Rig, effect: Effect) -> bool:
     """Whether a ripple at the recordings' own rate is the effect's."""
+    order = ripples_a_turn(effect)
+    return order is not None and any(abs(x.at - order) < x.cell for x in rig.lines.fresh())
+
+
+def ripples_a_turn(effect: Effect) -> float | None:
+    """Of an effect that goes with the wheel's angle."""
     if effect.fingerprint.covariate != TURNING:
-        return False
+        return None
     name = order_of(type(effect))
-    order = float(getattr(effect, name)) if name else 1.0
-    return any(abs(x.at - order) < x.cell for x in rig.lines.fresh())
+    return float(getattr(effect, name)) if name else 1.0

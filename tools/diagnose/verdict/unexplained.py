@@ -32,12 +32,22 @@ class UnexplainedTerms:
 
 
 def unexplained_with(screening: Screening, model: Model) -> UnexplainedTerms | None:
-    """The functions that act together beside a model; None where none pays for itself."""
-    chosen, price = _chosen(screening, model)
-    if not chosen:
+    """The functions that act together beside a model, one taken up after the other, while each
+    gains by linear algebra more than the choice among all costs; None where none pays for itself.
+    """
+    functions = screening.shapes(model)
+    if not functions:
         return None
+    beside = without_harmonics(screening.problem, model.fitted)
+    kinds = float(np.log(len({s.of for s in functions})))
+    parts = parts_of(beside, screening.problem.noise, functions, kinds)
+    taken = take_up(parts, range(len(functions)), TUNING.verdict.together).parts
+    if not taken:
+        return None
+
+    chosen = [functions[k] for k in taken]
     best = _fitted(screening, model, chosen)
-    gain = best.evidence - model.evidence + price
+    gain = best.evidence - model.evidence + sum(parts.prior[k] for k in taken)
     return UnexplainedTerms(best, tuple(chosen), gain) if gain > 0.0 else None
 
 
@@ -59,17 +69,3 @@ def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> 
         model.other_forms,
         fitted,
     )
-
-
-def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]:
-    """Functions one after the other, while each gains by linear algebra more than the choice among
-    all costs; and that cost [nats, negative].
-    """
-    functions = screening.shapes(model)
-    if not functions:
-        return [], 0.0
-    beside = without_harmonics(screening.problem, model.fitted)
-    kinds = float(np.log(len({s.of for s in functions})))
-    parts = parts_of(beside, screening.problem.noise, functions, kinds)
-    taken = take_up(parts, range(len(functions)), TUNING.verdict.together).parts
-    return [functions[k] for k in taken], sum(parts.prior[k] for k in taken)

@@ -16,6 +16,7 @@ from gritd.tools.diagnose.explain.result import (
     Reference,
     SoilFit,
 )
+from gritd.tools.diagnose.verdict.decision import QUIET
 from gritd.tools.report.words import quantity, to_tell
 
 SHOWN = 4  # places and hypotheses
@@ -52,7 +53,7 @@ def _shown(diagnosis: Diagnosis) -> list[Hypothesis]:
     """What is accepted, then what has a probability in the digits that are printed; of a campaign
     in which nothing is amiss none.
     """
-    if diagnosis.verdict in ("consistent", "insufficient"):
+    if diagnosis.verdict in QUIET:
         return []
     others = (of for of in diagnosis.hypotheses if not of.accepted)
     likely = [of for of in others if of.probability >= 0.5 * 10.0**-DIGITS]

@@ -17,7 +17,6 @@ from gritd.tools.diagnose.explain.result import (
 )
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.report import (
-    effect_notes,
     figures,
     front,
     hypotheses,
@@ -72,7 +71,6 @@ def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
         tables.law(diagnosis),
         _caveats(diagnosis),
         _next(diagnosis),
-        effect_notes.notes(hypotheses.named(diagnosis.hypotheses)),
         _redo(diagnosis, name),
         redo.appendix(diagnosis.redo),
     )

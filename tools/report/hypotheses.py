@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from gritd.tools.cli.wording import listed, number, percent
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis
-from gritd.tools.report.effect_notes import linked
 from gritd.tools.report.html import Child, Markup, table, tag
 from gritd.tools.report.words import counted, held, name_of, nats
 
@@ -62,12 +61,6 @@ def _rank(h: Hypothesis, place: int) -> tuple[bool, float, int, int]:
     return not h.accepted, -round(h.probability, TIE), len(h.parameters), place
 
 
-def named(of: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Those that stand in view as bars."""
-    likely = [group for group in together(of) if _likely(group)][:MOST]
-    return [h for group in likely for h in group]
-
-
 def _likely(group: Sequence[Hypothesis]) -> bool:
     return any(h.accepted for h in group) or max(h.probability for h in group) >= UNLIKELY
 
@@ -93,7 +86,7 @@ def _bar(h: Hypothesis) -> Markup:
     width = f"width:{100.0 * min(max(h.probability, 0.0), 1.0):.1f}%"
 
     label = tag(
-        "p", tag("b", linked(h.effect)), " accepted" if h.accepted else None, class_="effect"
+        "p", tag("b", name_of(h.effect)), " accepted" if h.accepted else None, class_="effect"
     )
     value = tag(
         "p",
@@ -114,7 +107,7 @@ def _bar(h: Hypothesis) -> Markup:
         value,
         track,
         tag("p", h.sentence, class_="note") if h.sentence else None,
-        tag("pre", h.equation) if h.accepted and h.equation else None,
+        tag("pre", h.equation) if h.equation else None,
         class_="bar",
     )
 

@@ -225,8 +225,8 @@ def test_what_is_accepted_comes_first_and_says_that_others_are_like_it() -> None
         Hypothesis("coulomb_friction", 0.3, 9.0, {"loss": one}, alike, accepted=True),
         Hypothesis("wheel_inertia", 0.1, 9.0, {"inertia": one}, ("coulomb_friction",)),
     )
-    names = [h.effect for h in hypotheses.named(equals)]
-    assert names == ["coulomb_friction", "stribeck_friction", "wheel_inertia"]
+    (group,) = hypotheses.together(equals)
+    assert [h.effect for h in group] == ["coulomb_friction", "stribeck_friction", "wheel_inertia"]
 
     found = replace(cases.ALL["explained"](), hypotheses=equals)
     said = words(diagnosis.render(found))
@@ -234,21 +234,18 @@ def test_what_is_accepted_comes_first_and_says_that_others_are_like_it() -> None
     assert "80 % probable" in said
 
 
-def test_in_a_tie_the_simpler_effect_stands_first_and_every_name_leads_to_its_formula() -> None:
+def test_in_a_tie_the_simpler_effect_stands_first_and_each_shows_its_equation() -> None:
     one, two = Quantity(1.0, 0.1, "N·m"), Quantity(0.1, 0.01, "-")
     tied = [
-        Hypothesis("stribeck_friction", 0.402, 9.0, {"loss": one, "speed": two}),
-        Hypothesis("coulomb_friction", 0.398, 9.0, {"loss": one}),
+        Hypothesis("stribeck_friction", 0.402, 9.0, {"a": one, "b": two}, equation="T_S = …"),
+        Hypothesis("coulomb_friction", 0.398, 9.0, {"loss": one}, equation="T_C = …"),
     ]
-    assert [h.effect for h in hypotheses.named(tied)] == ["coulomb_friction", "stribeck_friction"]
+    names = [h.effect for group in hypotheses.together(tied) for h in group]
+    assert names == ["coulomb_friction", "stribeck_friction"]
 
-    found = diagnosis.render(replace(cases.ALL["explained"](), hypotheses=tuple(tied)))
-    root = parsed(found)
-    targets = {e.get("id") for e in root.iter() if e.get("id")}
-    links = {e.get("href") for e in root.iter("a")}
-    assert links == {"#effect-coulomb_friction", "#effect-stribeck_friction"}
-    assert all(link[1:] in targets for link in links if link)
-    assert "A probability is the share of an effect among all that was weighed" in words(found)
+    said = words(diagnosis.render(replace(cases.ALL["explained"](), hypotheses=tuple(tied))))
+    assert said.index("T_C = …") < said.index("T_S = …")
+    assert "A probability is the share of an effect among all that was weighed" in said
 
 
 def test_the_runs_stand_before_the_pictures_with_their_notes() -> None:

@@ -16,7 +16,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
     """One sentence each, of the fit of the accepted model in the noise that was found."""
-    return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model), *_loud(rig, noise))
+    return (*_bounded(rig, model), *_unfinished(model), *_loud(rig, noise))
 
 
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
@@ -30,10 +30,13 @@ def _words(constant: Constant) -> str:
     """A constant; of a bed that was prepared anew, whose change it is."""
     if constant.changes:
         return f"{SOIL[constant.changes]} of the new bed"
+    if constant.channel:
+        return f"{constant.kind} of {spelled(constant.channel)}"
     return SOIL.get(constant.name, constant.name)
 
 
-def _strained(rig: Rig, model: Model) -> Iterator[str]:
+def strained(rig: Rig, model: Model) -> Iterator[str]:
+    """One sentence for each of them."""
     for name, strain in strains(rig, model):
         yield f"Strained: {name} stands {sigmas(strain)} from what is known of it."
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain.result import Discrepancy, Location, NextExperiment
+from gritd.tools.diagnose.explain.result import Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.interface import Foreseen, Rig
 from gritd.tools.diagnose.search.search import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
@@ -31,28 +31,16 @@ State = tuple[Array, Sequence[Effect]]  # constants u (q,), effects as fitted
 
 
 def next_experiment(
-    search: EffectSearch,
-    decision: Decision,
-    location: Sequence[Location],
-    forms: Mapping[str, Discrepancy],
+    search: EffectSearch, decision: Decision, location: Sequence[Location]
 ) -> NextExperiment | None:
-    """None where model and recordings agree, or one explanation stands alone. forms: how far the
-    form of the model may be off in each channel: no rival predicts an experiment better.
-    """
-    sigmas = _sigmas(search, forms)
+    """None where model and recordings agree, or one explanation stands alone."""
     if decision.verdict == "insufficient":
-        return _most_shown(search, sigmas)
+        return _most_shown(search)
     if decision.verdict == "unlisted":
         return _along_misfit(search.problem.stack.rig, location, _mistaken(decision))
 
     rivals = _rivals(search, decision)
-    return _between(search, rivals, sigmas) if len(rivals) > 1 else None
-
-
-def _sigmas(search: EffectSearch, forms: Mapping[str, Discrepancy]) -> dict[str, float]:
-    """Of each channel, by how much a prediction of one value may be off, noise included."""
-    colours = zip(search.problem.stack.rig.channels, search.problem.noise.colours, strict=True)
-    return {channel: hypot(colour.sigma, forms[channel].size) for channel, colour in colours}
+    return _between(search, rivals) if len(rivals) > 1 else None
 
 
 def _proposed(key: str, gain: float, separates: tuple[str, ...]) -> NextExperiment:
@@ -70,14 +58,12 @@ def _rivals(search: EffectSearch, decision: Decision) -> list[Model]:
     return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.shown] if best.names else []
 
 
-def _between(
-    search: EffectSearch, rivals: list[Model], sigmas: Mapping[str, float]
-) -> NextExperiment | None:
+def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     rig = search.problem.stack.rig
     first, *others = (m.fitted for m in rivals)
     one, each = (first.u, first.acting), [(m.u, m.acting) for m in others]
-    gains = {k: _gains(search, sigmas, k, one, each) for k in rig.words.menu.driven}
+    gains = {k: _gains(search, k, one, each) for k in rig.words.menu.driven}
     told = {}
     for key, of in gains.items():
         pairs = zip(rivals[1:], of, strict=True)
@@ -105,7 +91,7 @@ def _by_hand(rig: Rig, names: tuple[str, ...]) -> NextExperiment | None:
 # ---- insufficient, and not in the list ---------------------------------------------------------
 
 
-def _most_shown(search: EffectSearch, sigmas: Mapping[str, float]) -> NextExperiment | None:
+def _most_shown(search: EffectSearch) -> NextExperiment | None:
     """The experiment with the largest median gain over the effects that these recordings could not
     show, and those that it would show.
     """
@@ -113,7 +99,7 @@ def _most_shown(search: EffectSearch, sigmas: Mapping[str, float]) -> NextExperi
     unseen = {name: _expected(effect) for name, effect in rig.effects.items() if name not in seen}
     each: list[State] = [(u, (one,)) for one in unseen.values()]
     driven = rig.words.menu.driven if unseen else ()
-    gains = {key: _gains(search, sigmas, key, (u, ()), each) for key in driven}
+    gains = {key: _gains(search, key, (u, ()), each) for key in driven}
 
     median = {key: float(np.median(of)) for key, of in gains.items()}
     best = max(median, key=lambda k: median[k], default="")
@@ -152,19 +138,13 @@ def _along_misfit(
 # ---- what is foreseen --------------------------------------------------------------------------
 
 
-def _gains(
-    search: EffectSearch,
-    sigmas: Mapping[str, float],
-    key: str,
-    one: State,
-    others: Sequence[State],
-) -> list[float]:
+def _gains(search: EffectSearch, key: str, one: State, others: Sequence[State]) -> list[float]:
     """What an experiment is expected to tell between one state and each of some others [nats]: half
-    the squared change of what is foreseen in units of sigmas, the soil's uncertainty among it.
+    the squared change of what is foreseen in units of noise, the soil's uncertainty among it.
     """
     rig, (u, acting) = search.problem.stack.rig, one
     here = rig.foresee(key, u, acting)
-    scale = _values({c: np.where(here.tells[c], sigmas[c], np.inf) for c in here.channels})
+    scale = _values(_noise(search, here))
 
     def changed(at: Array, effects: Sequence[Effect]) -> Array:
         there = rig.foresee(key, at, effects)
@@ -189,3 +169,13 @@ def _gains(
 def _values(channels: Mapping[str, Array]) -> Array:
     """One value a second of every channel: neighbours share their noise."""
     return np.concatenate([values[:: round(TUNING.rig.rate)] for values in channels.values()])
+
+
+def _noise(search: EffectSearch, here: Foreseen) -> dict[str, Array]:
+    """Standard deviation of each value; infinite where a channel tells nothing."""
+    stack, sigmas = search.problem.stack, {}
+    for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
+        usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
+        sigma = hypot(colour.sigma, TUNING.explain.foreseen_error * usual)
+        sigmas[channel] = np.where(here.tells[channel], sigma, np.inf)
+    return sigmas

@@ -10,7 +10,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
-from gritd.tools.diagnose.explain.doubts import doubts, strains
+from gritd.tools.diagnose.explain.doubts import doubts, strained, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
@@ -38,7 +38,7 @@ from gritd.tools.diagnose.rig.interface import Bools, Rig
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.search import EffectSearch, without
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.verdict.decision import Decision
+from gritd.tools.diagnose.verdict.decision import QUIET, Decision
 
 
 def explain(
@@ -58,15 +58,14 @@ def explain(
         soil = soil_of(problem, base.fitted, decision)
         learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
         location = located()
-    forms = discrepancies(problem, accepted)
-    proposed = next_experiment(search, decision, location, forms)
+    proposed = next_experiment(search, decision, location)
 
     unlisted = decision.verdict == "unlisted"
     law = find_law(search, location, soil, after) if unlisted else None
     left, fit = remainders(problem, accepted), _fit(problem, before, after)
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary(decision, location, fit, search.first, rig, strains(rig, base)),
+        summary=summary(decision, location, fit, search.first, rig, strains(rig, accepted)),
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
@@ -74,11 +73,11 @@ def explain(
         fit=fit,
         law=law,
         next_experiment=proposed,
-        caveats=_caveats(problem, accepted, whole, redo, search.failed, location),
+        caveats=_caveats(search, decision, redo, location),
         share=decision.share,
         remaining=left,
         remaining_words=_remaining(decision, bool(strains(rig, accepted)), left, bool(rig.forms)),
-        discrepancy=forms,
+        discrepancy=discrepancies(problem, accepted),
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
         reference=None,
@@ -235,20 +234,17 @@ def _noise(problem: Problem) -> dict[str, dict[str, float]]:
 
 
 def _caveats(
-    problem: Problem,
-    accepted: Model,
-    whole: Model,
+    search: EffectSearch,
+    decision: Decision,
     redo: Mapping[str, Any],
-    failed: Sequence[Sequence[str]],
     location: Sequence[Location],
 ) -> tuple[str, ...]:
-    """Sentences on what to doubt; whole: the accepted model with unexplained terms; failed:
-    effects that no fit was had of.
-    """
-    rig = problem.stack.rig
+    """Sentences on what to doubt."""
+    rig, noise = search.problem.stack.rig, search.problem.noise
+    whole = decision.beside.model if decision.beside is not None else decision.best
     sentences = list(rig.words.caveats)
-    if failed:
-        names = listed(sorted({" with ".join(of) for of in failed}))
+    if search.failed:
+        names = listed(sorted({" with ".join(of) for of in search.failed}))
         sentences.append(f"Left out, for their algebra failed: {names}.")
     if redo.get("quick"):
         sentences.append(
@@ -261,11 +257,13 @@ def _caveats(
             " thirds of it were held out."
         )
 
-    acting = (*rig.baseline, *accepted.fitted.acting)
+    acting = (*rig.baseline, *decision.best.fitted.acting)
+    told = decision.verdict in QUIET  # in the summary
     return (
         *sentences,
         *rig.words.shortcomings,
-        *doubts(rig, whole, problem.noise),
+        *(() if told else strained(rig, whole)),
+        *doubts(rig, whole, noise),
         *left_over(rig, acting, {x.channel for x in location if OSCILLATES in x.where}),
     )
 
@@ -280,7 +278,7 @@ def _remaining(
         kinds = dict.fromkeys(described(f.shape) for f in decision.beside.functions)
         return f"Something without a name remains: {', '.join(kinds)}."
 
-    quiet = decision.verdict in ("consistent", "insufficient")
+    quiet = decision.verdict in QUIET
     missed = [words for c, each in left.items() if (words := missed_words(c, each, not quiet))]
     if missed:
         without = "Without its discrepancy of form, the model" if formed else "The model"

@@ -14,7 +14,7 @@ from gritd.tools.diagnose.explain.result import Fit, Location
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.verdict.decision import Decision, Resembled
+from gritd.tools.diagnose.verdict.decision import QUIET, Decision, Resembled
 
 PLACE_OF = {  # stage of an effect -> where it acts
     "soil": "the soil",
@@ -37,7 +37,7 @@ def summary(
     """strained: constants far from what is known of them [σ]."""
     subject = "Model and recordings" if all(rig.new) else "Reference and new campaign"
     p = f"({chance(screen.p)})"
-    if decision.verdict in ("consistent", "insufficient"):
+    if decision.verdict in QUIET:
         return _quiet(decision, f"{subject} agree {p}", p, strained)
 
     sentences = [f"{subject} differ {p}."]

@@ -59,6 +59,8 @@ def described(shape: Shape) -> str:
     """A misfit without a name in words: `a step in drawbar pull along the bed`."""
     if shape.along == ("constant",):
         return f"an offset of {spelled(shape.channel)}"
+    if shape.along == ("run",):
+        return f"a change in {spelled(shape.channel)} from run to run"
     where = " and ".join(PLACES.get(name, f"with {spelled(name)}") for name in shape.along)
     kind = "smooth change" if shape.kind == "smooth" else shape.kind
     return f"a {kind} in {spelled(shape.channel)} {where}"

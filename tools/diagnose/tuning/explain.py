@@ -18,6 +18,11 @@ class Explain:
     doubtful: float = tuned(3.0, "σ", "from what is known, or times the stated noise: reported")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is reported")
 
+    # --- experiment.py ---
+    foreseen_error: float = tuned(
+        0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
+    )
+
     # --- explanation.py ---
     shown: int = tuned(4, "lines, runs, or scatters", "that are shown of many")
 

@@ -10,6 +10,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.verdict.unexplained import UnexplainedTerms
 
 Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
+QUIET = ("consistent", "insufficient")  # verdicts by which no mismatch shows
 
 
 @dataclass(frozen=True)

@@ -34,12 +34,19 @@ class HeldOut:
 
 
 def run_folds(stack: Stack) -> list[Bools]:
-    """Marks (N,) of each run; with few runs, of equal parts of each run in time."""
-    runs = np.unique(stack.run)
-    if len(runs) >= TUNING.fit.folds:
-        return [stack.run == r for r in runs]
+    """Marks (N,) of each run; of campaigns of few runs, of equal parts of each run in time: what is
+    new is learnt from the new runs that are left.
+    """
+    few = {
+        new
+        for new in (False, True)
+        if np.unique(stack.run[stack.new == new]).size < TUNING.fit.folds
+    }
+    runs = [stack.run == r for r in np.unique(stack.run) if stack.rig.new[r] not in few]
     ranks = _parts(stack.time, stack.run)
-    return [f for f in ((ranks == k) for k in range(TUNING.fit.folds)) if f.any()]
+    parted = np.isin(stack.new, list(few))
+    parts = [parted & (ranks == k) for k in range(TUNING.fit.folds)]
+    return [fold for fold in (*runs, *parts) if fold.any()]
 
 
 def condition_folds(stack: Stack) -> list[Bools]:

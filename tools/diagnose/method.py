@@ -33,9 +33,9 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
-from gritd.tools.diagnose.verdict.baseline import baseline_effects
+from gritd.tools.diagnose.verdict.baseline import baseline_effects, no_news
 from gritd.tools.diagnose.verdict.decide import decide
-from gritd.tools.diagnose.verdict.decision import Verdict
+from gritd.tools.diagnose.verdict.decision import Decision
 
 OF_REFERENCE = "the reference: "  # what is done with it alone
 
@@ -71,25 +71,33 @@ def first_answer() -> Iterator[None]:
 
 def _diagnose(
     rig: Rig,
-    of_reference: Verdict | None,
+    of_reference: Decision | None,
     redo: Mapping[str, Any],
     step: Callable[[str], None],
     jobs: int,
 ) -> Diagnosis:
     step("fitting the soil and the noise")
-    search = _searched(rig, step, jobs)
-    decision = decide(search, jobs, step)
+    base = fit_base(rig, jobs)
+    known = no_news(base, base.model, of_reference)
+    if not known:
+        search, decision = _decided(base, step, jobs)
+        if decision.best.names:
+            known = no_news(base, decision.best, of_reference)
+    if known and rig.having:
+        return _diagnose(rig.having(known), of_reference, redo, step, jobs)
 
     step("holding out runs and conditions")
     found = explain(search, decision, redo, jobs)
-    return found if all(rig.new) else with_reference(found, rig, of_reference)
+    if all(rig.new):
+        return found
+    return with_reference(found, rig, of_reference.verdict if of_reference else None)
 
 
 def accustomed(
     rig: Rig, step: Callable[[str], None] = lambda _: None, jobs: int = 1
-) -> tuple[Rig, Verdict | None]:
-    """The rig with what its reference shows by itself in both campaigns, and the verdict on that; a
-    rig without a reference as it is.
+) -> tuple[Rig, Decision | None]:
+    """The rig with what its reference shows by itself in both campaigns, and what is decided of it;
+    a rig without a reference as it is.
     """
     if rig.reference is None or rig.having is None:
         return rig, None
@@ -99,14 +107,16 @@ def accustomed(
         step(f"{OF_REFERENCE}{what}")
 
     said("fitting the soil and the noise")
-    decision = decide(_searched(alone, said, jobs), jobs, said)
-    return rig.having(baseline_effects(alone, decision)), decision.verdict
+    _, decision = _decided(fit_base(alone, jobs), said, jobs)
+    return rig.having(baseline_effects(alone, decision)), decision
 
 
-def _searched(rig: Rig, step: Callable[[str], None], jobs: int) -> EffectSearch:
-    base = fit_base(rig, jobs)
+def _decided(
+    base: BaseFit, step: Callable[[str], None], jobs: int
+) -> tuple[EffectSearch, Decision]:
     give_back()
-    return search_models(prepare_screening(base), step, jobs)
+    search = search_models(prepare_screening(base), step, jobs)
+    return search, decide(search, jobs, step)
 
 
 def fit_base(rig: Rig, jobs: int = 1) -> BaseFit:

@@ -4,7 +4,7 @@ bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -141,6 +141,12 @@ class Problem:
         gram = self.nuisance.gram
         gram[np.diag_indices_from(gram)] += 1.0
         return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
+
+    def in_both(self, names: Collection[str]) -> Problem:
+        """The same where effects of some names act in the reference campaign too."""
+        other = copy(self)
+        other.stack = Stack(self.stack.rig, names)
+        return other
 
     def with_terms(self, terms: Sequence[RandomEffect], sizes: Sequence[float]) -> Problem:
         """The same with terms of given sizes."""

@@ -13,7 +13,7 @@ in units of its usual speed; what is said is in newton metres and radians a seco
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,7 +105,7 @@ class DriveModel:
     usual: float
 
     def predict(
-        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
     ) -> list[dict[str, Array]]:
         """Motor torque [N·m]: see interface.Predict."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))

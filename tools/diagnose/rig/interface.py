@@ -7,7 +7,7 @@ without soil. The other rooms work on the arrays defined here and know a rig by 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -178,10 +178,10 @@ class Predict(Protocol):
     """Every channel of every run."""
 
     def __call__(
-        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
     ) -> list[dict[str, Array]]:
-        """Channels (n,) for constants u (q,) in prior σ and effects beyond the baseline;
-        everywhere: the effects act in the reference campaign too.
+        """Channels (n,) for constants u (q,) in prior σ and effects beyond the baseline; in_both:
+        names of those that act in the reference campaign too.
         """
 
 
@@ -209,8 +209,8 @@ class Rig:
     effects:    the candidates.
     new:        of each run, whether candidates act; in all where there is no reference.
     foresee:    every channel under an experiment of the menu.
-    having:     the rig with effects in both campaigns, whose parameters are constants. A candidate
-        of the same name is what is new of it.
+    having:     the rig with further effects in both campaigns, whose parameters are constants. A
+        candidate of the same name is what is new of it.
     reference:  the rig with the runs of the reference alone; None where there is none.
     baseline:   effects of the configuration: the model has them already.
     smooth:     covariates, alone or multiplied, on which a smooth misfit may depend.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Prediction:
             self._inner[[part.start, part.stop - 1]] = False
 
     def channels(
-        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
     ) -> list[dict[str, Array]]:
         """See interface.Predict."""
         value = self._values(u)
@@ -66,7 +66,7 @@ class Prediction:
 
         true = []  # readings (channels, n) of each campaign before scale, offset and delay
         for new, campaign in self._campaigns:
-            acting = (*baseline, *effects) if new or everywhere else baseline
+            acting = (*baseline, *(e for e in effects if new or e.name in in_both))
             weights = 1.0 + value["weights"] + self._own_weights(value)[self._data.set_of(new)]
             travelled = 1.0 + value["carriage_scale"]
             true.append(campaign.readings(self._soil(value, new), weights, travelled, acting))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -15,8 +15,9 @@ from gritd.tools.diagnose.rig.interface import Bools, Channels, Index, Rig
 class Stack:
     """The used values of all channels and runs as one vector (N,): by channel, run, then time."""
 
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
+    def __init__(self, rig: Rig, in_both: Collection[str] = ()) -> None:
+        """in_both: names of effects that act in the reference campaign too."""
+        self.rig, self.in_both = rig, in_both
         self.parts = [
             (channel, number) for channel in rig.channels for number in range(len(rig.runs))
         ]
@@ -102,9 +103,8 @@ class Stack:
         """(N,) in the channels' units, for constants u (q,) in prior σ; everywhere: the effects act
         in the reference campaign too.
         """
-        if everywhere and self.referred:
-            return self.joined(self.rig.predict(u, effects, True))
-        return self.joined(self.rig.predict(u, effects))
+        in_both = [effect.name for effect in effects] if everywhere else self.in_both
+        return self.joined(self.rig.predict(u, effects, in_both))
 
     @cached_property
     def referred(self) -> bool:

@@ -93,6 +93,7 @@ def wheel_rig(
     left_out = _left_out(settings.effects, data.stated)
     settings = replace(settings, effects=_acting(settings.effects, data.stated))
     had = _acting(had, data.stated)
+    having = lambda more: again((*had, *more))  # noqa: E731
     acting = replace(settings, effects=(*settings.effects, *had))  # in both campaigns
 
     anew = bool(reference) and bed == "prepared"
@@ -122,7 +123,7 @@ def wheel_rig(
         smooth=SMOOTH,
         heated=("torque",),
         foresee=prediction.foresee,
-        having=again,
+        having=having,
         reference=alone if reference else None,
         baseline=configured(settings.effects),
         slipping="carriage_scale",

@@ -19,7 +19,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
-from gritd.tools.diagnose.verdict.baseline import baseline_effects
+from gritd.tools.diagnose.verdict.baseline import baseline_effects, no_news
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import record
@@ -118,3 +118,29 @@ def test_a_ripple_has_another_phase_in_each_run() -> None:
 def test_nothing_is_had_where_nothing_alarms() -> None:
     rig, decision = decided(quick=False)
     assert decision.verdict == "consistent" and baseline_effects(rig, decision) == ()
+
+
+def both_with(before: tuple[Effect, ...], after: tuple[Effect, ...]) -> tuple[Rig, Decision]:
+    """Two campaigns of three runs, and what is decided of the first alone."""
+    runs = [*record(plan(seed=3), before), *record(plan(seed=4), after)]
+    return wheel_rig(runs, settings(), 3, "same"), decided(*before)[1]
+
+
+def test_what_the_reference_does_not_tell_alone_is_no_news_if_it_explains_both() -> None:
+    rig, of_reference = both_with((LAG,), (LAG,))
+    base = fit_base(rig)
+    (known,) = no_news(base, base.model, of_reference)
+    assert known.name == "contact_relaxation"
+    assert rig.having is not None
+    again = fit_base(rig.having([known]))
+    assert no_news(again, again.model, of_reference) == ()
+
+
+def test_what_the_reference_does_not_show_is_news() -> None:
+    friction = make("coulomb_friction", {"loss": 0.3})
+    rig, of_reference = both_with((), (friction,))
+    base = fit_base(rig)
+    with first_answer():
+        decision = decide(search_models(prepare_screening(base)))
+    assert decision.best.names == ("coulomb_friction",)
+    assert no_news(base, decision.best, of_reference) == ()

@@ -16,7 +16,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SLIGHT
+from gritd.tools.diagnose.tuning.guards import SLIGHT, SUMMED
 
 
 def reconciled(mean: float, sigma: float) -> tuple[float, float]:
@@ -36,7 +36,7 @@ def reconciled(mean: float, sigma: float) -> tuple[float, float]:
 
 def _points(value: float, own: float) -> Array:
     """Where the densities are summed: fine about both, out to where both have ended."""
-    unit = np.tan(0.5 * np.pi * np.linspace(-1.0, 1.0, TUNING.explain.summed_steps)[1:-1])
+    unit = np.tan(0.5 * np.pi * np.linspace(-1.0, 1.0, SUMMED)[1:-1])
     return np.unique(np.concatenate((unit, value + min(own, 1.0) * unit)))
 
 

@@ -31,7 +31,6 @@ class Explain:
     precision_freedom: float = tuned(
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
     )
-    summed_steps: int = tuned(801, "points", "about each of the two", "run time")
 
     # --- law.py ---
     law_leaves: float = tuned(0.1, "share", "of the misfit at most: else the law is none of it")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 
 from gritd.estimator.visible import visible
@@ -21,7 +20,7 @@ from gritd.tools.report.words import quantity, to_tell
 
 SHOWN = 4  # places and hypotheses
 DIGITS = 2  # of a probability
-NEARLY = 0.999  # nothing is surer
+LEAST, NEARLY = 0.75, 0.999  # sureness that is worth saying, and than which none is greater
 NAMES = {"c": "c", "tan_phi": "tan φ"}
 
 
@@ -117,5 +116,5 @@ def _foreseen(following: NextExperiment, verdict: str) -> str:
         return ""
     told = to_tell(verdict, following.separates)
     sure = following.expected_probability
-    known = f" ({percent(min(sure, NEARLY))} sure)" if math.isfinite(sure) else ""
-    return f": {told}{known}"
+    known = sure >= LEAST  # else it is not foreseen, or next to nothing
+    return f": {told} ({percent(min(sure, NEARLY))} sure)" if known else f": {told}"

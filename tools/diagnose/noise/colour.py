@@ -142,7 +142,7 @@ def products_of_innovations(
         own += piece.transpose(0, 2, 1) @ piece
     gram = np.zeros((len(colours), columns.shape[1], columns.shape[1]))
     gram[:, acting[:, None], acting] = own
-    return gram, _log_det(recursion)
+    return gram, np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
 def _innovations(
@@ -184,11 +184,6 @@ def _follow(
         slow += gain[0, i] * innovation
         fast += gain[1, i] * innovation
     out /= scale[rows.start : rows.stop].T[:, :, None]
-
-
-def _log_det(recursion: tuple[Array, Array, Array]) -> Array:
-    """Of the covariance of each colour (g,)."""
-    return np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
 def innovation_variance(gaps: Array, colours: Sequence[Colour]) -> Array:

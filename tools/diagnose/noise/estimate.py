@@ -100,14 +100,14 @@ def estimate(
     waves = standing(stack, residual, explainable, cells)
     saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
 
-    posteriors = each(
+    found = each(
         jobs,
-        lambda channel: _posterior(stack, channel, residual, saturated, cells, before, ~stack.idle),
+        lambda channel: _colour_of(stack, channel, residual, saturated, cells, before, ~stack.idle),
         stack.rig.channels,
     )
-    colours = _chosen(stack, posteriors)
-    own = replicates.own_columns(stack, residual, colours, waves)
-    noise = _noise(stack, predicted, residual, colours, own, explainable.leading)
+    colours, own = tuple(found), replicates.own_columns(stack, residual, found)
+    single = uncertain(stack, predicted, residual, colours, explainable.leading)
+    noise = Noise(stack, colours, single, own)
     return calmer(noise, residual, saturated, cells, before, stack.idle)
 
 
@@ -126,14 +126,14 @@ def estimate_of_reference(
     may stand off their neighbours.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
-    posteriors = [
-        _posterior(stack, channel, residual, explainable, cells, before, ~stack.new & ~stack.idle)
+    rows = ~stack.new & ~stack.idle
+    colours = tuple(
+        _colour_of(stack, channel, residual, explainable, cells, before, rows)
         for channel in stack.rig.channels
-    ]
-    colours = _chosen(stack, posteriors)
+    )
 
-    none = np.zeros((stack.size, 0))
-    noise = _noise(stack, predicted, calm, colours, none, explainable.leading)
+    single = uncertain(stack, predicted, calm, colours, explainable.leading)
+    noise = Noise(stack, colours, single, np.zeros((stack.size, 0)))
     return calmer(noise, residual, explainable, cells, before, stack.idle & ~stack.new)
 
 
@@ -152,28 +152,14 @@ def calmer(
     stack = noise.stack
     if np.count_nonzero(idle) < 2 * TUNING.noise.cell_values:  # as of two conditions
         return noise
-    step = step_of(stack.gaps)
-    sized, weight = _posterior(stack, "torque", residual, explainable, cells, before, idle)
-    own, usual = _careful(sized, weight, step), noise.colours[stack.rig.channels.index("torque")]
+    own = _colour_of(stack, "torque", residual, explainable, cells, before, idle)
+    usual = noise.colours[stack.rig.channels.index("torque")]
 
+    step = step_of(stack.gaps)
     power, usual_power = (c.sigma**2 * _slow_power(c, step) for c in (own, usual))
     ratio = max(own.sigma / usual.sigma, float(np.sqrt(power / usual_power)))
     times = np.where(stack.idle, np.clip(ratio, TUNING.noise.least_noise, 1.0), 1.0)
     return replace(noise, rougher=noise.times * times)
-
-
-def _noise(
-    stack: Stack,
-    predicted: Array,
-    residual: Array,
-    colours: tuple[Colour, ...],
-    own: Array,
-    explainable: Array,
-) -> Noise:
-    """Of a colour of each channel; own: columns (N, m) of each run by itself; explainable: columns
-    (N, p).
-    """
-    return Noise(stack, colours, uncertain(stack, predicted, residual, colours, explainable), own)
 
 
 def louder(one: Noise, other: Noise) -> Noise:
@@ -227,20 +213,20 @@ def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
     return steady
 
 
-def _posterior(
+def _colour_of(
     stack: Stack,
     channel: str,
     residual: Array,
     saturated: Explainable,
     cells: Index,
     before: Noise,
-    rows: Bools | None = None,
-) -> tuple[list[Colour], Array]:
-    """Every colour that is tried, with its likeliest size, and its probability (g,); by some rows
-    (N,) only.
+    rows: Bools,
+) -> Colour:
+    """Of a channel's noise, by some rows (N,) where they hold any of its steady values: of all
+    colours that are tried, each in its likeliest size.
     """
     own = _steady(stack, channel, before)
-    if rows is not None and (own & rows).any():
+    if (own & rows).any():
         own = own & rows
     mean = saturated_mean(residual[own], saturated.leading[own], saturated.whole[own], cells[own])
     columns = np.column_stack((mean, residual[own]))
@@ -256,13 +242,7 @@ def _posterior(
         replace(c, sigma=max(float(np.sqrt(v)), least))
         for c, v in zip(tried, variance, strict=True)
     ]
-    return sized, weight / weight.sum()
-
-
-def _chosen(stack: Stack, posteriors: Sequence[tuple[list[Colour], Array]]) -> tuple[Colour, ...]:
-    """Of each channel the colour to whiten with."""
-    step = step_of(stack.gaps)
-    return tuple(_careful(sized, weight, step) for sized, weight in posteriors)
+    return _careful(sized, weight / weight.sum(), step_of(stack.gaps))
 
 
 def colours() -> list[Colour]:

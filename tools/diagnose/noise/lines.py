@@ -88,12 +88,6 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     return np.asarray(tried[tried * interval < TUNING.orders.nyquist])
 
 
-def waves(x: Array, frequency: Array) -> Array:
-    """Cosines and sines (n, f, 2)."""
-    phase = 2.0 * np.pi * np.multiply.outer(x, frequency)
-    return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
-
-
 def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
     """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it
     itself.
@@ -142,7 +136,7 @@ def _long(stack: Stack, channel: str) -> Array:
     longest = max(float(np.ptp(x[part])) for part in parts)
     beyond = (TUNING.orders.cycles + TUNING.orders.near + 1.0) / longest
     most = 1 + int(TUNING.noise.line_density * (TUNING.orders.near + 1.0))
-    shapes = waves(x[index], tried[tried < beyond][:most])
+    shapes = pair(x[index], tried[tried < beyond][:most])
     out = np.zeros((stack.size, 2 * shapes.shape[1]))
     out[index] = shapes.reshape(index.size, -1)
     return out

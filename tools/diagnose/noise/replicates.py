@@ -3,17 +3,15 @@ the model.
 
 A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated
 model, so that a misfit of any shape over the conditions does not count as noise. Runs that held
-the same condition on equal terms (same pass, same start) are replicates: what their means, their
-drifts and the phases of their waves differ by, beyond the noise inside a run, is pure error
-between runs. A bed that is not level, say, lets the sinkage of each trial drift its own way, and
-an encoder without a zero mark begins each run at another tooth of the gear. A drift that
-replicates share (a soil that dries, a motor that warms) is none: it stays in full, to be
-explained.
+the same condition on equal terms (same pass, same start) are replicates: what their means and their
+drifts differ by, beyond the noise inside a run, is pure error between runs. A bed that is not
+level, say, lets the sinkage of each trial drift its own way. A drift that replicates share (a soil
+that dries, a motor that warms) is none: it stays in full, to be explained.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,37 +80,27 @@ class HeldCondition(NamedTuple):
     chance: Array  # (m,) their variance by noise
 
 
-def own_columns(
-    stack: Stack, residual: Array, colours: tuple[Colour, ...], standing: Array
-) -> Array:
+def own_columns(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Array:
     """What each run may do for itself (N, m), one standard deviation each, as large as
-    replicates show it.
-
-    An offset; and, of a run that held one condition, drifts and the phase of waves that stand
-    out of the noise.
-    residual, standing: (N,) and (N, k), what was not predicted, and the waves in it (lines.py).
+    replicates show it in what was not predicted, `residual` (N,): an offset; and, of a run that
+    held one condition, drifts.
     """
     label, terms, columns = cells(stack), _terms(stack), []
     for number, colour in enumerate(colours):
-        waves = _waves(stack, number, standing)
-        sigma = between_runs(
-            list(_held(stack, residual, label, number, colour, waves)),
-            terms,
-            TUNING.noise.drift_shapes + waves.shape[1],
-        )
+        sigma = between_runs(list(_held(stack, residual, label, number, colour)), terms)
 
         for run in range(len(stack.rig.runs)) if sigma.any() else ():
             own = _driven(stack, number, run)
             shapes = np.zeros((stack.size, len(sigma)))
-            shapes[own] = sigma * _shapes(stack.time[own], waves[own]) if own.any() else 0.0
+            shapes[own] = sigma * _shapes(stack.time[own]) if own.any() else 0.0
             columns += list(shapes[:, : None if _one_condition(own, label) else 1].T)
 
     used = [column for column in columns if column.any()]
     return np.column_stack(used) if used else np.zeros((stack.size, 0))
 
 
-def between_runs(held: list[HeldCondition], terms: Array, count: int) -> Array:
-    """Standard deviations between replicates beyond the noise inside a run (count,); 0 where
+def between_runs(held: list[HeldCondition], terms: Array) -> Array:
+    """Standard deviations between replicates beyond the noise inside a run (m,); 0 where
     nothing was repeated.
 
     Of what one channel did while conditions were held. From successive differences (von Neumann
@@ -120,24 +108,11 @@ def between_runs(held: list[HeldCondition], terms: Array, count: int) -> Array:
     each run (runs, 2).
     """
     pairs = [(one, two) for one in held if (two := _next(one, held, terms)) is not None]
-    return _spread([(two.shape - one.shape, one.chance + two.chance) for one, two in pairs], count)
-
-
-def _waves(stack: Stack, number: int, standing: Array) -> Array:
-    """Waves of a channel that have a phase of their own in every run, one column for all runs
-    (N, k).
-    """
-    runs = range(len(stack.rig.runs))
-    own = [(stack.channel == number) & (stack.run == run) for run in runs]
-    used = standing != 0.0
-    theirs = [np.flatnonzero(used[mask].any(axis=0) & ~used[~mask].any(axis=0)) for mask in own]
-    if len({index.size for index in theirs}) != 1:
-        return np.zeros((stack.size, 0))
-    return np.asarray(np.sum([standing[:, index] for index in theirs], axis=0))
+    return _spread([(two.shape - one.shape, one.chance + two.chance) for one, two in pairs])
 
 
 def _held(
-    stack: Stack, residual: Array, label: Index, number: int, colour: Colour, waves: Array
+    stack: Stack, residual: Array, label: Index, number: int, colour: Colour
 ) -> Iterator[HeldCondition]:
     """Every condition that every run held, in one channel, run after run."""
     conditions = _conditions(stack)
@@ -151,15 +126,14 @@ def _held(
         )
 
         for mask in (m for m in masks if m.sum() >= TUNING.noise.cell_values):
-            shapes = _shapes(stack.time[mask], waves[mask])[:, : None if only else 1]
+            shapes = _shapes(stack.time[mask])[:, : None if only else 1]
             inverse = np.linalg.pinv(shapes)
             noise = covariance(colour, stack.time[mask], stack.gaps[mask])
-            coefficients = np.full((2, TUNING.noise.drift_shapes + waves.shape[1]), np.nan)
+            coefficients = np.full((2, TUNING.noise.drift_shapes), np.nan)
             coefficients[:, : shapes.shape[1]] = (
                 inverse @ residual[mask],
                 np.diag(inverse @ noise @ inverse.T),
             )
-            coefficients[:, : shapes.shape[1]][:, ~shapes.any(axis=0)] = np.nan
             yield HeldCondition(
                 run, conditions[mask].mean(axis=0), coefficients[0], coefficients[1]
             )
@@ -199,26 +173,20 @@ def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCo
     )
 
 
-def _shapes(time: Array, waves: Array) -> Array:
-    """What a run may do for itself (n, SHAPES + waves): Legendre polynomials over a stretch of
-    time, and waves.
-
-    Of waves what is no drift; nothing where that is little.
-    """
+def _shapes(time: Array) -> Array:
+    """What a run may do for itself (n, m): Legendre polynomials over a stretch of time."""
     along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), SPAN) - 1.0
-    drifts = legendre.legvander(along, TUNING.noise.drift_shapes - 1)
-    left = waves - drifts @ np.linalg.lstsq(drifts, waves, rcond=None)[0]
-    kept = np.sum(left**2, axis=0) > TUNING.noise.mostly * np.sum(waves**2, axis=0)
-    return np.column_stack((drifts, np.where(kept, left, 0.0)))
+    return legendre.legvander(along, TUNING.noise.drift_shapes - 1)
 
 
-def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
-    """Standard deviations (count,), from differences and what variance noise alone gives them,
-    (count,) each.
+def _spread(differences: list[tuple[Array, Array]]) -> Array:
+    """Standard deviations (m,), from differences and what variance noise alone gives them, (m,)
+    each.
 
-    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in
-    few cases only.
+    Of means what exceeds the noise; of drifts too, where noise alone makes so much in few cases
+    only.
     """
+    count = TUNING.noise.drift_shapes
     out = np.zeros(count)
     for order, (difference, chance) in enumerate(
         np.array(differences).reshape(-1, 2, count).transpose(2, 1, 0)

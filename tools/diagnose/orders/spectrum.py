@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.stretches import Ints, Samples
@@ -118,20 +117,13 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
 
 
 def log_chance(spectra: Sequence[Spectrum]) -> Array:
-    """Chance (o,) of all parts together; 0 where none tells. Found for some places at a time: all
-    of many parts are large.
-    """
-    count, parts = spectra[0].power.size, len(spectra)
-    steps = np.linspace(0, count, max(min(parts, count // parts), 1) + 1).astype(int).tolist()
-    some = [_log_chance([s.at(slice(*ends)) for s in spectra]) for ends in pairwise(steps)]
-    return np.concatenate(some)
-
-
-def _log_chance(spectra: Sequence[Spectrum]) -> Array:
+    """Chance (o,) of all parts together; 0 where none tells."""
     beside = -np.sum([s.log_chance for s in spectra], axis=0)
     count = np.sum([s.known for s in spectra], axis=0)
-    terms = np.arange(len(spectra))[:, None]
-    with np.errstate(divide="ignore"):
-        logs = terms * np.log(np.maximum(beside, SQUARE)) - gammaln(terms + 1.0)
-    summed = logsumexp(np.where(terms < count, logs, -np.inf), axis=0)
+
+    # chance of a sum x of `count` exponential values: e^−x Σ xᵏ/k!, k below count
+    logarithm, summed = np.log(np.maximum(beside, SQUARE)), np.full(beside.size, -np.inf)
+    for k in range(len(spectra)):
+        term = k * logarithm - gammaln(k + 1.0)
+        summed = np.where(k < count, np.logaddexp(summed, term), summed)
     return np.where(count > 0, np.minimum(summed - beside, 0.0), 0.0)

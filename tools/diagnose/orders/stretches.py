@@ -63,9 +63,13 @@ class Samples:
         return max(max(float(np.ptp(place[own])) for own in self.slices), SPAN)
 
     def parts(self) -> list[Samples]:
-        """A long run cut into equal parts, each with a phase of its own."""
-        turns = self.span("angle") / TUNING.orders.longest_part
-        count = int(np.ceil(max(turns, self.span("time") / TUNING.orders.longest_seconds)))
+        """A long run cut into equal parts, each with a phase of its own: so long that no more
+        frequencies are tried in time than orders against the angle.
+        """
+        orders = TUNING.orders.longest_part * TUNING.orders.highest_order
+        turns = self.span("angle") * TUNING.orders.highest_order
+        cycles = self.span("time") * TUNING.orders.highest_frequency
+        count = int(np.ceil(max(turns, cycles) / orders))
         share = (self.time - self.time[0]) / self.span("time")
         number = np.minimum((count * share).astype(int), count - 1)
         return [self._some(number == k) for k in range(count) if np.sum(number == k) > 1]

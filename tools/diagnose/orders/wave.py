@@ -29,10 +29,10 @@ class Amplitude:
         return float(np.hypot(self.cos, self.sin))
 
 
-def pair(place: Array, at: float) -> Array:
-    """Cosine and sine (n, 2) of `at` cycles a unit, at places (n,)."""
-    phase = 2.0 * np.pi * at * place
-    return np.column_stack((np.cos(phase), np.sin(phase)))
+def pair(place: Array, at: Array | float) -> Array:
+    """Cosine and sine (n, …, 2) of `at` (…) cycles a unit, at places (n,)."""
+    phase = 2.0 * np.pi * np.multiply.outer(place, at)
+    return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
 
 
 def amplitude_of(part: Samples, axis: str, at: float, level: float) -> Amplitude:

@@ -1,4 +1,6 @@
-"""What is known of a wheel's testbed and soil: the constants of its model with their priors."""
+"""What is known of a wheel's testbed and soil: the constants of its model with their priors, and
+the noise of its sensors.
+"""
 
 from __future__ import annotations
 
@@ -28,16 +30,12 @@ def wheel_constants(
     settings: Settings,
     channels: Sequence[str],
     sets: WeightSets,
-    weights_stated: bool,
     had: Sequence[ConfiguredEffect],
 ) -> tuple[Constant, ...]:
-    """Soil, calibration of every channel, weights, configured effects, and baseline effects.
-
-    weights_stated: whether all runs state their weights; else the load cell tells them.
-    """
+    """Soil, calibration of every channel, weights, configured effects, and baseline effects."""
     return (
         *_soil(settings),
-        *_calibrations(settings, channels, sets, weights_stated),
+        *_calibrations(settings, channels, sets),
         *_floating(settings.effects),
         *_floating(had, HAD),
     )
@@ -48,9 +46,7 @@ def of_channel(channel: str, kind: str, sigma: float, unit: str = "") -> Constan
     return Constant(f"{channel}_{kind}", 0.0, sigma, unit, channel=channel, kind=kind)
 
 
-def _calibrations(
-    settings: Settings, channels: Sequence[str], sets: WeightSets, weights_stated: bool
-) -> list[Constant]:
+def _calibrations(settings: Settings, channels: Sequence[str], sets: WeightSets) -> list[Constant]:
     constants = []
     for channel in channels:
         scale, offset = calibration_sigmas(settings, channel)
@@ -64,25 +60,13 @@ def _calibrations(
         constants.append(Constant(LEAN, 0.0, TUNING.rig.lean))
 
     nominal = settings.load.nominal
-    common = max(nominal.sigma / max(nominal.value, SPAN), TUNING.rig.least_weights)
+    common = max(nominal.sigma / max(nominal.value, SPAN), TUNING.rig.scale_floor)
     constants.append(Constant("weights", 0.0, common))
-    for name, load in zip(sets.names, sets.loads, strict=True):
-        constants.append(Constant(name, 0.0, _own_weight(settings, load, common, weights_stated)))
+    constants += [Constant(name, 0.0, TUNING.rig.own_weights * common) for name in sets.names]
 
     carriage = settings.channels["carriage_encoder"].calibration.scale
     scale = max(carriage.sigma / abs(carriage.value), TUNING.rig.scale_floor)
     return [*constants, Constant("carriage_scale", 0.0, scale)]
-
-
-def _own_weight(settings: Settings, load: float, common: float, weights_stated: bool) -> float:
-    """Relative standard deviation of one set of weights for itself: its own, or the load cell's at
-    that load.
-    """
-    if settings.wrench is None or weights_stated:
-        return TUNING.rig.own_weights * common
-    return float(
-        np.hypot(TUNING.rig.own_weights * common, settings.wrench.load.offset.sigma / load)
-    )
 
 
 def calibration_sigmas(settings: Settings, channel: str) -> tuple[float, float]:
@@ -183,3 +167,30 @@ def preparation(settings: Settings) -> dict[str, float]:
         "k": stated.shear_modulus,
     }
     return {name: known.get(name, 0.0) or usual for name, usual in TUNING.rig.prepared.items()}
+
+
+def noise_of_readings(settings: Settings, loss_of_drive: bool) -> dict[str, float]:
+    """Standard deviation of one reading of each channel with a sensor, in the channel's unit, as
+    the configuration states it.
+
+    loss_of_drive: whether channel torque is motor torque less axle torque.
+    """
+    drive = settings.drive.torque_constant.value
+    factors = {"torque": ("motor_shunt", drive), "sinkage": ("sinkage_pot", 1.0)}
+    channels = settings.channels
+    noise = {
+        channel: abs(factor * channels[name].noise * channels[name].calibration.scale.value)
+        for channel, (name, factor) in factors.items()
+        if name in channels
+    }
+
+    wrench = settings.wrench
+    if wrench is not None:
+        noise["axle_torque"] = wrench.torque_noise * abs(wrench.torque.scale.value)
+        noise["drawbar_pull"] = wrench.force_noise * abs(wrench.drawbar_pull.scale.value)
+        if wrench.side_force is not None:
+            noise["side_force"] = wrench.force_noise * abs(wrench.side_force.scale.value)
+        noise["load"] = wrench.force_noise * abs(wrench.load.scale.value)
+        if loss_of_drive and "torque" in noise:
+            noise["torque"] = float(np.hypot(noise["torque"], noise["axle_torque"]))
+    return noise

@@ -4,8 +4,9 @@ Speeds, and loads where some run does not state its weights, are measured with n
 that is driven by them has that noise in it, and what was measured does not follow it. So a residual
 goes with the noise, and any effect with a slope along the speed would be credited for it (errors in
 variables: Fuller 1987, Measurement Error Models, ch. 1). How much of the unrest of a speed is noise
-is left to every fit: the wheel may truly have moved so. Of a load three things are: how much of its
-quick changes are noise, how much of its slow ones, and by how much the mean of each run is off.
+is left to every fit: the wheel may truly have moved so. Of a load four things are: the zero of its
+sensor, how much of its quick changes are noise, how much of its slow ones, and by how much the mean
+of each run is off.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.ndimage import median_filter
 
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools, Channels, Constant, Predict
@@ -26,7 +28,7 @@ Parts = Sequence[Array | float]  # of each run, relative errors (n,) of a speed 
 
 
 def errors_of_motion(
-    predict: Predict, constants: Sequence[Constant], data: Recorded
+    predict: Predict, constants: Sequence[Constant], data: Recorded, settings: Settings
 ) -> tuple[list[Channels], list[list[Channels]]]:
     """See interface.Rig: motion_sigma, and those of its nuisances that are the motion's.
 
@@ -42,12 +44,13 @@ def errors_of_motion(
     if data.stated:
         return sigma, unrest
 
+    zero = 0.0 if settings.wrench is None else settings.wrench.load.offset.sigma
     by_load = _by(predict, constants, "weights")
-    noise = _moved(by_load, [_relative_noise(one) for one in data.weights])
+    noise = _moved(by_load, [_relative(one.sigma, one) for one in data.weights])
     sigma = [
         {c: np.hypot(own[c], more[c]) for c in own} for own, more in zip(sigma, noise, strict=True)
     ]
-    return sigma, [*unrest, *(_moved(by_load, parts) for parts in _of_load(data.weights))]
+    return sigma, [*unrest, *(_moved(by_load, parts) for parts in _of_load(data.weights, zero))]
 
 
 def _by(predict: Predict, constants: Sequence[Constant], name: str) -> list[dict[str, Array]]:
@@ -92,8 +95,9 @@ def _unrest(speed: Array, moving: Bools) -> Array:
 # ---- load ----------------------------------------------------------------------------------------
 
 
-def _of_load(weights: Sequence[Weights]) -> Iterator[Parts]:
-    """Each error of the measured loads."""
+def _of_load(weights: Sequence[Weights], zero: float) -> Iterator[Parts]:
+    """Each error of the measured loads. zero: standard deviation of the sensor's zero [N]."""
+    yield [0.0 if one.load is None else _relative(zero, one) for one in weights]
     none = (0.0, 0.0)
     changes = [none if one.load is None else changes_of(one.values) for one in weights]
     for parts in zip(*changes, strict=True):
@@ -109,7 +113,7 @@ def changes_of(load: Array) -> tuple[Array, Array]:
     slow ones beside the run's level; 0 where other weights hang on the axle, or none.
     """
     level = _level(load)
-    near = np.abs(load - level) <= TUNING.rig.other_weights * level
+    near = np.abs(load - level) <= TUNING.rig.close_load * level
     logarithm = np.log(np.where(near, load, level))
     slow = median_filter(logarithm, TUNING.rig.unrest_values, mode="nearest")
     quick = np.where(near, logarithm - slow, 0.0)
@@ -121,7 +125,7 @@ def error_of_level(load: Array) -> float:
     colour of its noise: by the means of parts of the run.
     """
     level = _level(load)
-    near = load[np.abs(load - level) <= TUNING.rig.other_weights * level]
+    near = load[np.abs(load - level) <= TUNING.rig.close_load * level]
     if near.size < TUNING.rig.load_parts:
         return 0.0
     means = [float(part.mean()) for part in np.array_split(near, TUNING.rig.load_parts)]
@@ -133,7 +137,9 @@ def _level(load: Array) -> float:
     return float(np.median(load[load > TUNING.rig.lifted * load.max()]))
 
 
-def _relative_noise(weights: Weights) -> Array:
-    """Of measured weights (n,); nothing where the wheel is lifted."""
+def _relative(error: Array | float, weights: Weights) -> Array:
+    """An error (n,) [N] of measured weights as a share of them; nothing where the wheel is
+    lifted.
+    """
     carried = weights.values > TUNING.rig.lifted * weights.values.max()
-    return np.where(carried, weights.sigma / np.where(carried, weights.values, 1.0), 0.0)
+    return np.where(carried, error / np.where(carried, weights.values, 1.0), 0.0)

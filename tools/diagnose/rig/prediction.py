@@ -14,7 +14,7 @@ from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.campaign import Campaign, parts_of, sensed_as
 from gritd.tools.diagnose.rig.constants import LEAN, SOIL
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Held
-from gritd.tools.diagnose.rig.proposals import driving, proposed
+from gritd.tools.diagnose.rig.proposals import proposed
 from gritd.tools.diagnose.rig.recorded import Recorded
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -77,10 +77,11 @@ class Prediction:
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
         """See interface.Rig: constants u (q,), effects as fitted."""
         value = self._values(u)
+        motion = proposed(experiment, self._data.motions, self._settings.wheel.radius)
         sensed = simulate_arrays(
             self._settings.wheel,
             self._soil(value, True),
-            proposed(experiment, self._data.motions, self._settings.wheel.radius),
+            motion,
             (*self._baseline(value), *effects),
             torque_constant=self._settings.drive.torque_constant.value,
             order=TUNING.rig.quadrature_order,
@@ -92,9 +93,9 @@ class Prediction:
         if self._less_axle is not None:
             read = self._less(read, np.ones(read.shape[1], bool))
         compared = dict(zip(self._channels, read, strict=True))
-        return Foreseen(
-            compared, {c: driving(experiment) | (c == "torque") for c in self._channels}
-        )
+        # at rest and lifted the motor current alone tells something
+        driving = (np.asarray(motion.wheel_speed) != 0.0) & (np.asarray(motion.load) > 0.0)
+        return Foreseen(compared, {c: driving | (c == "torque") for c in self._channels})
 
     def _values(self, u: Array) -> dict[str, float]:
         return {c.name: c.of(float(x)) for c, x in zip(self._constants, u, strict=True)}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
@@ -13,16 +12,7 @@ from gritd.tools.diagnose.rig.interface import Menu
 from gritd.tools.diagnose.tuning import TUNING
 
 MENU = Menu(
-    driven=(
-        "standstill",
-        "reversal",
-        "slip_step",
-        "speed_step",
-        "shifted_start",
-        "second_pass",
-        "load_step",
-        "lifted_spin",
-    ),
+    driven=tuple(TUNING.rig.proposal_levels),
     along={
         "slip": "slip_step",
         "speed": "speed_step",
@@ -69,16 +59,6 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     )
 
 
-def driving(key: str) -> NDArray[np.bool_]:
-    """Whether the wheel drives on the soil (n,): at rest and lifted the motor current alone tells
-    something.
-    """
-    speeds, _, loads = TUNING.rig.proposal_levels[key]
-    time = np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.rate)) / TUNING.rig.rate
-    driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)
-    return driving
-
-
 def _middle(values: Sequence[Array | float]) -> float:
     joined = np.concatenate([np.atleast_1d(v) for v in values])
     moving = joined[joined > TUNING.rig.creep * joined.max()] if joined.max() > 0.0 else joined
@@ -86,8 +66,7 @@ def _middle(values: Sequence[Array | float]) -> float:
 
 
 def _stepped(levels: Sequence[float], time: Array) -> Array:
-    index = np.minimum(
-        (time / TUNING.rig.proposal_seconds * len(levels)).astype(int), len(levels) - 1
-    )
-    values: Array = np.asarray(levels, dtype=np.float64)
-    return np.asarray(values[index], dtype=np.float64)
+    share = time / TUNING.rig.proposal_seconds
+    index = np.minimum((share * len(levels)).astype(int), len(levels) - 1)
+    stepped: Array = np.asarray(levels, dtype=float)[index]
+    return stepped

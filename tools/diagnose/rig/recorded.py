@@ -82,7 +82,7 @@ def recorded(
         motion_of(s, w.values, settings, s.start - began[n])
         for s, w, n in zip(signals, weights, new, strict=True)
     ]
-    sets = weight_sets([w.sets for w in weights])
+    sets = weight_sets(weights)
     loss = read_off and loss_measured(signals, channels)
     idle = idle_values(signals, motions, settings) if loss else None
     return Recorded(signals, new, channels, weights, motions, sets, idle)

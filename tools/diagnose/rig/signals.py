@@ -192,7 +192,7 @@ def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tupl
             " beginning."
         )
 
-    if (end - start) * rate < TUNING.rig.grid_values:
+    if (end - start) * rate < TUNING.rig.encoder_readings:
         overlap = f"{max(end - start, 0.0):.2f} s of both encoders together"
         raise _too_little(recording, overlap, "some seconds")
     try:

@@ -39,15 +39,14 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
             TUNING.rig.longest_settling,
         )
     )
-    apart = round(passing / step), round(TUNING.rig.settling / step)
+    settling = round(TUNING.rig.settling / step)
 
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
-    driving, spinning = (_inside(np.where(state, way, 0.0), *apart) for state in (carrying, lifted))
-    resting = _inside(
-        (rest & carrying).astype(float),
-        round(TUNING.rig.resting / step),
-        round(TUNING.rig.rising / step),
+    driving, spinning = (
+        _inside(np.where(state, way, 0.0), round(passing / step), settling)
+        for state in (carrying, lifted)
     )
+    resting = _inside((rest & carrying).astype(float), settling, settling)
     return driving, resting, spinning
 
 

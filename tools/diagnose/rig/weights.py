@@ -25,10 +25,13 @@ MEASURED_NOTE = (
 
 class Weights(NamedTuple):
     values: Array  # (n,) [N] what the wheel is driven with
-    sets: Array  # (n,) [N] the same while the same weights hang on the axle
-    known: bool  # stated, so that the measured load can be compared with them
     load: Array | None = None  # (n,) [N] as it was measured, where they are taken from it
     sigma: Array | float = 0.0  # (n,) [N] of the values, by the noise of the sensor
+
+    @property
+    def known(self) -> bool:
+        """Whether they are stated, so that the measured load can be compared with them."""
+        return self.load is None
 
 
 def weights_in(signals: Sequence[Signals], settings: Settings) -> list[Weights]:
@@ -53,13 +56,11 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
 
     measured = _measured(signals, settings)
     if measured is None or measured.load is None or settings.wrench is None:
-        return Weights(constant, constant, True)
+        return Weights(constant)
 
     load = measured.load
-    near, lifted = (
-        np.abs(load - stated) <= TUNING.rig.close_load * stated + TUNING.rig.close_force,
-        load <= TUNING.rig.lifted * stated,
-    )
+    apart = TUNING.rig.close_load * stated + TUNING.rig.doubt * _noise(load)
+    near, lifted = np.abs(load - stated) <= apart, load <= TUNING.rig.lifted * stated
 
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
     known = nominal is not None or abs(held - stated) <= TUNING.rig.doubt * _sigma(
@@ -70,8 +71,7 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
         and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
         and np.mean(near) > np.mean(lifted)
     ):
-        hung = np.where(load > 0.5 * stated, constant, 0.0)
-        return Weights(hung, hung, True)
+        return Weights(np.where(load > 0.5 * stated, constant, 0.0))
 
     return measured
 
@@ -91,9 +91,9 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
     load = filled(measured)
     if signals.info.steady_states:  # one after the other, they have nothing in common
         values, sigma = _of_rows(signals, load)
-        return Weights(values, values, False, load, sigma)
-    values, sigma = felt(signals.time, load)
-    return Weights(values, levels(signals.time, load), False, load, sigma)
+    else:
+        values, sigma = felt(signals.time, load)
+    return Weights(values, load, sigma)
 
 
 def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
@@ -141,21 +141,6 @@ def felt(time: Array, load: Array) -> tuple[Array, Array]:
     return mean, np.hypot(noise, bent)
 
 
-def levels(time: Array, load: Array) -> Array:
-    """The weights (n,) [N] behind a measured load (n,): its mean over each stretch on which it is
-    level, else as it was measured.
-    """
-    near = _moments(load, _half(time))
-    slack = TUNING.rig.load_level * np.abs(load) + TUNING.rig.load_noise * _noise(load)
-    level, local = np.ptp(near, axis=1) <= slack, near.mean(axis=1)
-    out = np.where(level, local, load)
-
-    for stretch in np.split(np.arange(load.size), np.flatnonzero(np.diff(level.astype(int))) + 1):
-        if level[stretch[0]] and np.ptp(local[stretch]) <= slack[stretch].mean():
-            out[stretch] = load[stretch].mean()
-    return out
-
-
 def _half(time: Array) -> int:
     """Values (n,) on each side of one that belong to its moment."""
     return max(round(0.5 * TUNING.rig.hold / float(np.median(np.diff(time)))), 1)
@@ -190,11 +175,14 @@ class WeightSets:
         return tuple(f"weights_{load:.4g}" for load in self.loads)
 
 
-def weight_sets(loads: Sequence[Array]) -> WeightSets:
-    """The sets in use, from the weights (n,) of each run [N]; none where all runs have the same."""
+def weight_sets(weights: Sequence[Weights]) -> WeightSets:
+    """The sets in use, from the weights of each run that states them; none where all have the same:
+    of measured ones the sensor errs, and not each set for itself.
+    """
+    loads = [w.values if w.known else np.zeros_like(w.values) for w in weights]
     values, count = np.unique(np.concatenate(loads), return_counts=True)
     held = values[(count >= TUNING.rig.encoder_readings) & (values > 0.0)]
-    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.least_weights) + 1)
+    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.scale_floor) + 1)
     if not 1 < len(sets) <= TUNING.noise.most_cells:
         none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
         return WeightSets((), none)
@@ -204,4 +192,4 @@ def weight_sets(loads: Sequence[Array]) -> WeightSets:
 
 def _nearest(load: Array, middle: Array) -> Index:
     apart = np.abs(load[:, None] / middle - 1.0)
-    return np.where(apart.min(axis=1) <= TUNING.rig.least_weights, apart.argmin(axis=1), -1)
+    return np.where(apart.min(axis=1) <= TUNING.rig.scale_floor, apart.argmin(axis=1), -1)

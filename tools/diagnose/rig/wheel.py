@@ -17,7 +17,13 @@ from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.phases import guide
 from gritd.tools.diagnose.rig.candidates import candidates
-from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
+from gritd.tools.diagnose.rig.constants import (
+    UNITS,
+    noise_of_readings,
+    preparation,
+    raised_to_floors,
+    wheel_constants,
+)
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.full_rate import aligned
 from gritd.tools.diagnose.rig.held import held_form
@@ -43,7 +49,6 @@ from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import Recorded, measured_of, recorded, to_one_side
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.stated_noise import noise_of_readings
 from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
@@ -99,7 +104,7 @@ def wheel_rig(
     anew = bool(reference) and bed == "prepared"
     prepared = preparation(settings) if anew else {}
     constants = (
-        *wheel_constants(settings, data.channels, data.sets, data.stated, had),
+        *wheel_constants(settings, data.channels, data.sets, had),
         *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
     )
     runs = measured_runs(data, acting, constants)
@@ -108,7 +113,7 @@ def wheel_rig(
 
     held = _held(data, settings, runs)
     prediction = Prediction(acting, data, constants, tuple(prepared), held)
-    motion_sigma, unrest = errors_of_motion(prediction.channels, constants, data)
+    motion_sigma, unrest = errors_of_motion(prediction.channels, constants, data, settings)
     surfaces = reliefs_of(runs, data.channels, height_of(settings)) if anew else ()
 
     return Rig(

@@ -32,6 +32,7 @@ from gritd.tools.diagnose.fit.ripples import line_columns, orders_shown
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.orders.wave import pair
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -168,7 +169,7 @@ def waves(
     for index in stretches if frequencies.size else ():
         rows = noise.touched(int(index[0]), int(index[-1]) + 1)
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
-        raw[index - rows.start] = size * lines.waves(x[index], frequencies)
+        raw[index - rows.start] = size * pair(x[index], frequencies)
         blocks.append(_block(noise, rows, raw))
 
     near = lines.neighbours(x, stretches, frequencies) if blocks else None
@@ -317,8 +318,8 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
     parts = [np.concatenate(parts)] if shape.shared else parts
     out = np.zeros((stack.size, 2 * len(parts)))
     for number, index in enumerate(parts):
-        pair = lines.waves(stack.covariate(axis)[index], np.array([shape.at]))[:, 0]
-        out[index, 2 * number : 2 * number + 2] = np.sqrt(2.0) * size * pair
+        wave = pair(stack.covariate(axis)[index], shape.at)
+        out[index, 2 * number : 2 * number + 2] = np.sqrt(2.0) * size * wave
     return out
 
 

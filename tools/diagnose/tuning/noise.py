@@ -85,11 +85,7 @@ class NoiseTuning:
     )
     least_pairs: int = tuned(2, "comparisons", "of replicates at least")
     drift_shapes: int = tuned(4, "shapes", "of what a run does: a mean and three of drift")
-    mostly: float = tuned(
-        0.9,
-        "share",
-        "of a run in one cell: it held one condition; of a wave that is no drift",
-    )
+    mostly: float = tuned(0.9, "share", "of a run in one cell: it held one condition")
 
     # --- saturated.py ---
     saturated_columns: int = tuned(40, "columns", "of the saturated mean, at most")

@@ -18,7 +18,6 @@ class Orders:
     apart: float = tuned(0.3, "s", "over which a change of speed or load is looked for")
     change_noise: float = tuned(5.0, "σ", "of their own noise: less is no ramp")
     most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
-    longest_seconds: float = tuned(300.0, "s", "likewise", "memory")
     longest_part: float = tuned(20.0, "turns", "a longer run is cut, each part its own phase")
 
     # --- spectrum.py ---

@@ -13,15 +13,16 @@ FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}
 LEAST = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
 Levels = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
-LEVELS: Mapping[str, Levels] = {  # factors on the middle speed, slips, factors on the middle load
+# factors on the middle speed, slips, factors on the middle load; the least effort first
+LEVELS: Mapping[str, Levels] = {
     "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
-    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
     "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
-    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
     "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
     "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
-    "second_pass": ((1.0,), (0.2,), (1.0,)),
     "shifted_start": ((1.0,), (0.2,), (1.0,)),
+    "second_pass": ((1.0,), (0.2,), (1.0,)),
+    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
+    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
 }
 
 
@@ -52,9 +53,11 @@ class RigTuning:
         LEAST, "-", "c in Pa, the others without a unit: no soil has less"
     )
     lean: float = tuned(0.02, "-", "of a force sensor across the wheel: a share of the load; 1°")
-    scale_floor: float = tuned(1e-3, "-", "relative: no sensor's scale is known better", DESIGN)
-    least_weights: float = tuned(
-        2e-3, "-", "relative: no weights are known better, closer ones are one stack", DESIGN
+    scale_floor: float = tuned(
+        1e-3,
+        "-",
+        "relative: no scale and no weights are known better; closer ones are one stack",
+        DESIGN,
     )
     own_weights: float = tuned(
         0.7, "-", "part of a common error of the weights that each set may have for itself"
@@ -79,12 +82,7 @@ class RigTuning:
         10.0, "-", "sigma of a constant not known, in what would take all of the torque"
     )
 
-    # --- form.py ---
-
     # --- motion_error.py ---
-    other_weights: float = tuned(
-        0.25, "-", "relative distance from a run's level: beyond it, other weights hang on the axle"
-    )
     load_parts: int = tuned(8, "parts", "of a run, whose mean loads tell the error of all")
 
     # --- proposals.py ---
@@ -98,20 +96,19 @@ class RigTuning:
         86_400.0, "s", "of a recording: what is sought over its time grows with this", "memory"
     )
     encoder_readings: int = tuned(
-        10, "readings", "of an encoder at least, or values at one load: a set of weights"
+        10, "values", "of an encoder, of a recording on its grid, or at one load at least"
     )
     drive_readings: int = tuned(100, "readings", "of each channel of a drive's log at least")
-    grid_values: int = tuned(5, "values", "of a recording on its grid at least")
 
     # --- states.py, drive.py, proposals.py ---
     creep: float = tuned(0.05, "-", "of the usual speed, or of the largest load: below it is rest")
-    settling: float = tuned(0.5, "s", "after a start at least, and before a stop, no value counts")
+    settling: float = tuned(
+        0.5, "s", "after a start or a stop at least, and before the next, no value counts"
+    )
     longest_settling: float = tuned(5.0, "s", "after the wheel starts, at most")
     contact_angle: float = tuned(
         0.7, "rad", "usual entry angle: by then the rim has passed one contact and has sunk"
     )
-    resting: float = tuned(0.4, "s", "the wheel must have stood for its current to be that at rest")
-    rising: float = tuned(0.2, "s", "the wheel must go on standing")
     turning_speed: float = tuned(1e-3, "m/s", "a slower rim does not turn")
     rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
     lifted: float = tuned(0.2, "-", "of the stated or least load: below it the wheel is lifted")
@@ -121,19 +118,14 @@ class RigTuning:
     unrest_most: float = tuned(7.5, "times", "the usual unrest: beyond, the motion changes")
     unrest_largest: float = tuned(0.03, "-", "usual unrest: more is no noise of a speed sensor")
 
-    # --- weight_sets.py ---
-
     # --- weights.py ---
     close_load: float = tuned(
-        0.15, "-", "relative distance of two loads at which both mean the same"
+        0.15, "-", "relative distance of two loads: beyond it, other weights hang on the axle"
     )
-    close_force: float = tuned(1.0, "N", "beside this: weights are not stated to less")
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
     doubt: float = tuned(
         4.0, "σ", "of weights, a current at rest, or a line: beyond, they are others"
     )
-    load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
-    load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
     hold: float = tuned(1.0, "s", "weights and speeds are held for at least so long")
 

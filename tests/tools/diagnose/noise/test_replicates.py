@@ -1,5 +1,5 @@
-"""Runs of one condition, one after the other: what they differ by, in means, drifts and phases, is
-no physics.
+"""Runs of one condition, one after the other: what they differ by, in means and drifts, is no
+physics.
 """
 
 from __future__ import annotations
@@ -76,20 +76,18 @@ def wandering(stack: Any, mean: float, drift: float, seed: int = 0) -> Array:
     return np.asarray(out)
 
 
-def own(stack: Any, residual: Array, waves: Array | None = None) -> Array:
-    """Root mean square (m,) of what a run may do for itself: offset, drifts, waves; one column of
-    each kind.
+def own(stack: Any, residual: Array) -> Array:
+    """Root mean square (m,) of what a run may do for itself: offset and drifts; one column of each
+    kind.
     """
-    standing = np.zeros((stack.size, 0)) if waves is None else waves
-    found = replicates.own_columns(stack, residual, (NOISE,), standing)
+    found = replicates.own_columns(stack, residual, (NOISE,))
     return np.asarray(np.sqrt(np.mean(found[stack.run == 0] ** 2, axis=0)))
 
 
 def test_noise_alone_makes_no_drift() -> None:
     stack = stack_of()
-    none = np.zeros((stack.size, 0))
     found = [
-        replicates.own_columns(stack, wandering(stack, 0.0, 0.0, seed), (NOISE,), none)
+        replicates.own_columns(stack, wandering(stack, 0.0, 0.0, seed), (NOISE,))
         for seed in range(40)
     ]
     assert np.mean([columns.shape[1] > RUNS for columns in found]) < 0.15
@@ -107,26 +105,10 @@ def test_means_and_drifts_of_their_own_are_found() -> None:
 
 
 def test_what_replicates_share_stays_to_be_explained() -> None:
-    """A drift and a wave that come again in every run are physics of the condition."""
+    """A drift that comes again in every run is physics of the condition."""
     stack = stack_of()
-    shared = 0.3 * np.exp(-stack.time / 5.0) + 0.1 * np.sin(9.0 * stack.time)
-    assert np.all(own(stack, wandering(stack, 0.0, 0.0) + shared, waves_of(stack)) < NOISE.sigma)
-
-
-def test_a_wave_of_another_phase_in_every_run_is_its_own() -> None:
-    stack = stack_of()
-    phase = np.array([0.3, 2.0, 4.1, 5.5, 1.2, 3.4])[stack.run]
-    found = own(
-        stack, wandering(stack, 0.0, 0.0) + 0.1 * np.sin(9.0 * stack.time + phase), waves_of(stack)
-    )
-    assert np.sum(found > 0.03) == 2
-
-
-def waves_of(stack: Any) -> Array:
-    """Cosine and sine of a line in every run, as `lines.standing` gives them."""
-    columns = [np.where(stack.run == run, wave(9.0 * stack.time), 0.0) for run in range(RUNS)
-               for wave in (np.cos, np.sin)]  # fmt: skip
-    return np.column_stack(columns)
+    shared = 0.3 * np.exp(-stack.time / 5.0)
+    assert np.all(own(stack, wandering(stack, 0.0, 0.0) + shared) < NOISE.sigma)
 
 
 def test_what_was_held_does_not_fall_on_an_edge() -> None:

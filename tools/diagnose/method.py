@@ -33,7 +33,11 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
-from gritd.tools.diagnose.verdict.baseline import baseline_effects, no_news
+from gritd.tools.diagnose.verdict.baseline import (
+    baseline_effects,
+    shown_as_well,
+    shown_unsurely,
+)
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
 
@@ -78,12 +82,11 @@ def _diagnose(
 ) -> Diagnosis:
     step("fitting the soil and the noise")
     base = fit_base(rig, jobs)
-    known = no_news(base, base.model, of_reference)
+    known = shown_unsurely(base, of_reference)
     if not known:
         search, decision = _decided(base, step, jobs)
-        if decision.best.names:
-            known = no_news(base, decision.best, of_reference)
-    if known and rig.having:
+        known = shown_as_well(base, decision.best)
+    if known and rig.having:  # from the beginning: what is noise and what is usual is another
         return _diagnose(rig.having(known), of_reference, redo, step, jobs)
 
     step("holding out runs and conditions")

@@ -19,8 +19,7 @@ of fit/shared.py.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
@@ -50,47 +49,49 @@ def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ..
     return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in lasting)
 
 
-def no_news(
-    base: BaseFit, accepted: Model, of_reference: Decision | None
-) -> tuple[ConfiguredEffect, ...]:
-    """Effects that explain both campaigns, acting in both, no worse than a model explains them:
-    what the reference is likeliest to show but does not tell from others, or an effect that was
-    accepted as new. The likeliest of these as fitted; none where there is none.
+def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[ConfiguredEffect, ...]:
+    """What the reference is likeliest to show, if both campaigns are no less likely with it than
+    without what is new; as fitted to both. of_reference: None where there is none.
+    """
+    shown = [w for w in of_reference.weighed if w.names] if of_reference else []
+    if not shown:
+        return ()
+    likeliest = max(shown, key=lambda w: w.probability)
+    return _in_both(base, base.model, [(likeliest.model.fitted, likeliest.names)])
 
-    base: without what is new; accepted: the base model, or one with what was accepted.
+
+def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...]:
+    """An effect that was accepted as new, if it explains both campaigns no worse in both; as fitted
+    to both. The likeliest of several.
+    """
+    if not base.problem.stack.referred:
+        return ()
+    return _in_both(base, accepted, [(accepted.fitted, (name,)) for name in accepted.names])
+
+
+def _in_both(
+    base: BaseFit, than: Model, tried: Sequence[tuple[Fitted, tuple[str, ...]]]
+) -> tuple[ConfiguredEffect, ...]:
+    """The likeliest of fits whose effects of some names act in both campaigns, if it is no less
+    likely than a model.
     """
     rig = base.problem.stack.rig
     had = {constant.parameter[0] for constant in rig.constants if constant.kind == HAD}
-    tried = [_InBoth(accepted.fitted, (name,)) for name in accepted.names]
-    shown = [w for w in of_reference.weighed if w.names] if of_reference else []
-    if shown:
-        likeliest = max(shown, key=lambda w: w.probability)
-        tried.append(_InBoth(likeliest.model.fitted, likeliest.names))
+    found: list[tuple[Model, tuple[str, ...]]] = []
+    for fitted, names in tried:
+        if all(_lasts(rig.effects[name]) and name not in had for name in names):
+            model = attempted(partial(_shared, base, fitted, names))
+            found += [(model, names)] if model is not None else []
 
-    found: list[tuple[tuple[str, ...], Model]] = []
-    for one in tried:
-        if of_reference and all(_lasts(rig.effects[n]) and n not in had for n in one.names):
-            made = attempted(partial(_shared, base, one))
-            found += [(one.names, made)] if made is not None else []
-    names, best = max(found, key=lambda one: one[1].evidence, default=((), accepted))
-    if best.evidence < accepted.evidence:
+    best, names = max(found, key=lambda one: one[0].evidence, default=(than, ()))
+    if best.evidence < than.evidence:
         return ()
     return tuple(ConfiguredEffect(name, dict(_parameters(best, name))) for name in names)
 
 
-@dataclass(frozen=True, eq=False)
-class _InBoth:
-    """A fit whose effects are tried, those of some names in both campaigns."""
-
-    fitted: Fitted
-    names: tuple[str, ...]
-
-
-def _shared(base: BaseFit, tried: _InBoth) -> Model:
-    problem = base.problem.in_both(tried.names)
-    begins = (base.fitted.u, tried.fitted.x)
-    effects, free = tried.fitted.effects, tried.fitted.free
-    return fit_model(problem, base.forms, effects, free, begins, base.model.sizes)
+def _shared(base: BaseFit, fitted: Fitted, names: Sequence[str]) -> Model:
+    problem, begins = base.problem.in_both(names), (base.fitted.u, fitted.x)
+    return fit_model(problem, base.forms, fitted.effects, fitted.free, begins, base.model.sizes)
 
 
 def _lasts(effect: type[Effect]) -> bool:

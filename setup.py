@@ -3,7 +3,7 @@ compiler, that serves. All else stands in pyproject.toml.
 
 One build serves every Python (the limited API), and names no folder of the computer that built it
 (-g0). A product must not be fused with a sum, nor sine and cosine be taken in one. SOURCES is what
-estimator/compiled/__init__.py compares: a module of other sources than those beside it is not used.
+estimator/compiled/sources.py compares: a module of other sources than those beside it is not used.
 """
 
 from pathlib import Path

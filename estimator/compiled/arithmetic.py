@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from gritd.estimator.compiled.sources import check_sources
+
 try:
-    from gritd.estimator.compiled import algebra, check_sources, closed, record
+    from gritd.estimator.compiled import algebra, closed, record
 
     check_sources(algebra, closed, record)
     from gritd.estimator.compiled.algebra import dot, mixed, update, variance

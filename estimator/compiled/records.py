@@ -7,7 +7,7 @@ reads the same files by both. `crc32` is that of zlib.
 
 from __future__ import annotations
 
-from gritd.estimator.compiled import check_sources
+from gritd.estimator.compiled.sources import check_sources
 
 try:
     from gritd.estimator.compiled import checksum

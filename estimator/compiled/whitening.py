@@ -4,7 +4,7 @@ stands in tools/diagnose/noise/colour.py. A test compares them.
 
 from __future__ import annotations
 
-from gritd.estimator.compiled import check_sources
+from gritd.estimator.compiled.sources import check_sources
 
 try:
     from gritd.estimator.compiled import innovations

@@ -15,8 +15,7 @@ from shutil import copytree, ignore_patterns
 import numpy as np
 import pytest
 
-from gritd.estimator import compiled
-from gritd.estimator.compiled import arithmetic
+from gritd.estimator.compiled import arithmetic, sources
 from gritd.estimator.filter import estimate as algebra
 from gritd.estimator.filter.estimate import STATES, Update, made, rows
 from gritd.estimator.filter.evidence import evidence
@@ -206,11 +205,11 @@ def test_a_table_of_another_size_is_refused():
 @pytest.mark.parametrize("change, used", [("", True), ("\n/* of the next version */\n", False)])
 def test_what_an_older_version_left_is_not_used(change, used, tmp_path, monkeypatch):
     """The modules stay where the next version is installed without a compiler."""
-    folder = Path(compiled.__file__).parent
+    folder = Path(sources.__file__).parent
     copytree(folder, tmp_path / "compiled", ignore=ignore_patterns("*.so"))
     with open(tmp_path / "compiled" / "tuples.h", "a", encoding="utf-8") as file:
         file.write(change)
-    monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled" / "__init__.py"))
+    monkeypatch.setattr(sources, "__file__", str(tmp_path / "compiled" / "sources.py"))
 
     for wrapper in ("arithmetic.py", "records.py", "whitening.py"):
         assert runpy.run_path(str(folder / wrapper))["BUILT"] is used

@@ -40,7 +40,7 @@ class CalibrationSource(Protocol):
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedSteps:
     """A recording in which the values were set one after the other.
 
     steps: (begin, end) [s] of each, from the first reading of the sensor; where there are none, the

@@ -22,7 +22,7 @@ from gritd.tools.calibrate.outcome import CalibrationOutcome, written
 from gritd.tools.calibrate.procedures import datum, encoders, load, pot, press, shunt, soil, torque
 from gritd.tools.calibrate.sources import (
     CalibrationSource,
-    Recorded,
+    RecordedSteps,
     known_value,
     known_values,
     steps,
@@ -208,7 +208,7 @@ def _known(
         raise CommandError("--step: expected --from FILE.mcap with it", USAGE)
     if arguments.step:
         times, known = steps(arguments.step, unit, sigma)
-        return known, Recorded(arguments.recorded, tuple(times))
+        return known, RecordedSteps(arguments.recorded, tuple(times))
     if arguments.known is None:
         raise CommandError(
             f"{arguments.what}: expected --known VALUES, such as '0, 10, 20 {shown}'", USAGE
@@ -216,7 +216,7 @@ def _known(
 
     known = known_values(arguments.known, unit, sigma)
     if arguments.recorded is not None:
-        return known, Recorded(arguments.recorded)
+        return known, RecordedSteps(arguments.recorded)
     return known, _live(arguments, settings, shown)
 
 

@@ -12,7 +12,7 @@ import pytest
 from gritd.estimator.config.settings import Uncertain
 from gritd.tools.calibrate.outcome import CalibrationOutcome
 from gritd.tools.calibrate.procedures import pot, torque
-from gritd.tools.calibrate.sources import Recorded
+from gritd.tools.calibrate.sources import RecordedSteps
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.files import recording
 from tests.tools.calibrate.bench import SETTINGS, Array, noisy, record, staircase
@@ -33,7 +33,7 @@ def heights(
     volts += creep * HEIGHTS[-1] / SCALE * time / time[-1]
     spiked(volts, spikes, seed)
     record(path, {"sinkage_pot": (time, volts)})
-    return pot.POT.outcome(Recorded(path), [Uncertain(v, 4.5e-5) for v in HEIGHTS])
+    return pot.POT.outcome(RecordedSteps(path), [Uncertain(v, 4.5e-5) for v in HEIGHTS])
 
 
 def spiked(values: Array, share: float, seed: int) -> None:

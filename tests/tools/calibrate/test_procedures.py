@@ -11,7 +11,7 @@ import pytest
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Uncertain
 from gritd.tools.calibrate.procedures import datum, encoders, load, pot, shunt, soil, torque
-from gritd.tools.calibrate.sources import Recorded
+from gritd.tools.calibrate.sources import RecordedSteps
 from gritd.tools.cli.files import recording
 from gritd.tools.commands.calibrate import main
 from tests.tools.calibrate.bench import SETTINGS, noisy, record, rig, staircase
@@ -52,7 +52,7 @@ def straight_pulls(tmp_path: Path, seed: int, which: str) -> list[float]:
 
     path = record(tmp_path / "r.mcap", {procedure.signal.channel: (time, raw)})
     known = [Uncertain(v, sigma) for v in values]
-    found = procedure.outcome(Recorded(path), known).values
+    found = procedure.outcome(RecordedSteps(path), known).values
     # the offset's σ is that of what is read at physical zero
     at_zero = Uncertain(
         found[0].value.value * -offset / scale + found[1].value.value, found[1].value.sigma
@@ -73,7 +73,7 @@ def test_turns_and_rail_give_the_angle_of_a_count(tmp_path: Path) -> None:
         time, angle = staircase([2 * np.pi * n + hand * rng.standard_normal() for n in range(4)])
         path = record(tmp_path / "w.mcap", {"wheel_encoder": (time, angle / 9.6e-5)})
         known = [Uncertain(2 * np.pi * n, hand) for n in range(4)]
-        found = encoders.outcome(encoders.WHEEL, Recorded(path), known).values
+        found = encoders.outcome(encoders.WHEEL, RecordedSteps(path), known).values
         assert [each.path[-1] for each in found] == ["scale"]
         return [of(found[0].value, 9.6e-5)]
 
@@ -82,7 +82,7 @@ def test_turns_and_rail_give_the_angle_of_a_count(tmp_path: Path) -> None:
         time, way = staircase([x + 2e-4 * rng.standard_normal() for x in (0.0, 0.5, 1.0)])
         path = record(tmp_path / "c.mcap", {"carriage_encoder": (time, way / 0.02 / 7.7e-4)})
         known = [Uncertain(x, 2e-4) for x in (0.0, 0.5, 1.0)]
-        found = encoders.outcome(encoders.CARRIAGE, Recorded(path), known, 0.02).values
+        found = encoders.outcome(encoders.CARRIAGE, RecordedSteps(path), known, 0.02).values
         return [of(found[0].value, 7.7e-4)]
 
     assert pulls(wheel) >= 0.9 and pulls(carriage) >= 0.9
@@ -147,7 +147,7 @@ def test_a_lever_and_a_sensor_give_the_torque_constant(tmp_path: Path) -> None:
         volts = noisy((held / true + 5.0) / 2.0, 4e-3, seed)
         path = record(tmp_path / "l.mcap", {"motor_shunt": (time, volts)})
         known = [Uncertain(v, 2e-3) for v in levels]
-        return [of(torque.by_lever(Recorded(path), known, SETTINGS).values[0].value, true)]
+        return [of(torque.by_lever(RecordedSteps(path), known, SETTINGS).values[0].value, true)]
 
     def sensor(seed: int) -> list[float]:
         time, axle = staircase((0.5, 1.5, 2.5, 1.0), seconds=6.0)

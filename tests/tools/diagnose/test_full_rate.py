@@ -96,7 +96,7 @@ def _diagnosed(acting: tuple[object, ...], seconds: float = 16.0) -> Diagnosis:
     return diagnose(rig_of(plan(seconds=seconds), acting), quick=True)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("order", [50.0, 73.0])
 def test_a_gear_that_the_grid_does_not_hold_is_named(order: float) -> None:
     """At 73 a turn the grid alone names an offset of the current."""
@@ -110,7 +110,7 @@ def test_a_gear_that_the_grid_does_not_hold_is_named(order: float) -> None:
     assert [line.at for line in found.lines] == [pytest.approx(order, abs=0.05)]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_gear_is_named_where_the_encoder_begins_anew_each_run() -> None:
     made = record_fully(plan(), _ripple(50.0))  # type: ignore[arg-type]
     turned = []
@@ -127,7 +127,7 @@ def test_a_gear_is_named_where_the_encoder_begins_anew_each_run() -> None:
     assert any("begins at other angles" in note for note in found.caveats)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_hub_that_lifts_the_potentiometer_is_named() -> None:
     """Three turns a run: too few for a line, which the grid holds."""
     found = _diagnosed((make("hub_runout", {"lift_cos": 5e-4, "lift_sin": 5e-4}),), 60.0)

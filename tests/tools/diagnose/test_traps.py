@@ -37,7 +37,7 @@ def test_a_quiet_rig_gives_no_alarm() -> None:
     assert diagnosed(plan()).verdict == "consistent"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("slow_time", "allowed"), [(0.3, 0), (1.0, 0), (3.0, 1)])
 @pytest.mark.parametrize("noise", [0.5, 2.0])
 def test_coloured_noise_of_unknown_size_gives_no_alarm(

@@ -56,7 +56,7 @@ def accepted(found: dict[str, Any]) -> set[str]:
     return {h["effect"] for h in found["hypotheses"] if h["accepted"]}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_new_in_a_later_campaign_is_what_is_named(tmp_path: Path) -> None:
     """By the command line: friction found on a smooth wheel, applied; then a wheel with lugs on the
     same rig.

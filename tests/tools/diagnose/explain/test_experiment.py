@@ -23,7 +23,7 @@ def proposed(found: Diagnosis) -> str:
     return following.key
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rivals_are_told_apart_by_what_they_do_differently() -> None:
     """Without reversal a constant loss and one that differs by direction are the same; driving back
     tells.
@@ -42,7 +42,7 @@ def test_what_is_insufficient_is_made_sufficient() -> None:
     assert proposed(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_stranger_is_followed_up_where_it_lives() -> None:
     found = diagnosed(plan(), (CableChainDrag(size=8.0),))
     assert found.verdict == "unlisted" and proposed(found)

@@ -131,7 +131,7 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
     assert locate(begun_elsewhere, held, held.fitted.predicted) == shown
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_noise_alone_has_no_change_points() -> None:
     """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a
     change point.

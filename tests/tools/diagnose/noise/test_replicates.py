@@ -151,14 +151,14 @@ def found_in(drawn: Plan, effect: tuple[Any, ...] = (), drift: float = 0.0) -> D
     return diagnose(wheel_rig(drifting(list(record(drawn, effect)), drift), drawn.settings))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("slow", "drift"), [(0.0, 0.0), (0.5, 0.0), (0.0, 3e-3), (0.3, 3e-3)])
 def test_runs_that_drift_for_themselves_are_no_alarm(slow: float, drift: float) -> None:
     found = found_in(repeated(slow), drift=drift)
     assert found.verdict in ("consistent", "insufficient"), found.summary
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("drift", [0.0, 3e-3])
 @pytest.mark.parametrize(
     "effect",

@@ -31,14 +31,6 @@ class Lines:
         """Of both campaigns."""
         return (*self.new, *self.reference)
 
-    def renamed(self, name: str, channel: str, scale: float) -> Lines:
-        """With the lines of one channel as those of another, in whose unit it is `scale`."""
-
-        def scaled(lines: Sequence[SpectralLine]) -> tuple[SpectralLine, ...]:
-            return tuple(x.scaled(channel, scale) if x.channel == name else x for x in lines)
-
-        return replace(self, new=scaled(self.new), reference=scaled(self.reference))
-
     def of(self, channel: str) -> list[SpectralLine]:
         """All lines of a channel, those of both campaigns once."""
         own = [line for line in self.new if line.channel == channel]

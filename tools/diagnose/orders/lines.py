@@ -52,12 +52,6 @@ class SpectralLine:
     harmonic: float = 0.0
     before: float = 0.0
 
-    def scaled(self, channel: str, scale: float) -> SpectralLine:
-        """As a line of another channel."""
-        amplitudes = tuple(a and a.scaled(scale) for a in self.amplitudes)
-        before = abs(scale) * self.before
-        return replace(self, channel=channel, amplitudes=amplitudes, before=before)
-
     @property
     def size(self) -> float:
         """Root mean square over the runs of the amplitude, in the channel's unit."""

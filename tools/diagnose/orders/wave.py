@@ -20,10 +20,6 @@ class Amplitude:
     sin: float
     sigma: float
 
-    def scaled(self, scale: float) -> Amplitude:
-        """In another unit."""
-        return Amplitude(scale * self.cos, scale * self.sin, scale * self.sigma)
-
     @property
     def size(self) -> float:
         return float(np.hypot(self.cos, self.sin))

@@ -29,6 +29,7 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Balanced, Motion, Sensed, advanced, situation_of
 from gritd.estimator.terramechanics.soil import Array, Wheel
 from gritd.tools.cli.command import DAMAGED, CommandError
+from gritd.tools.diagnose.rig.constants import UNITS as WHEEL_UNITS
 from gritd.tools.diagnose.rig.constants import of_channel
 from gritd.tools.diagnose.rig.interface import Constant, GridRun, Rig, RigWords
 from gritd.tools.diagnose.rig.proposals import MENU
@@ -47,11 +48,7 @@ CAVEAT = "A drive without soil: inertia and viscous friction are the base model.
 SMOOTH = (
     ("speed",), ("velocity",), ("acceleration",), ("wheel_angle",), ("velocity", "acceleration"),
 )  # fmt: skip
-UNITS = {
-    "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad",
-    "wheel_angle": "rad", "time": "s", "heat": "A²·s", "direction": "-", "run": "-",
-    "constant": "-", "slip": "-", "load": "N", "sinkage": "m",
-}  # fmt: skip
+UNITS = WHEEL_UNITS | {"speed": "rad/s", "position": "rad"}
 
 
 def drive_rig(

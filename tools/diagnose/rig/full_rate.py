@@ -16,7 +16,6 @@ from gritd.estimator.offline.windows import block_mean
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
-from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.on_grid import on_grid
 from gritd.tools.diagnose.orders.phases import guide, shifts
 from gritd.tools.diagnose.orders.stretches import GridMotion, Samples, Series, steady_samples
@@ -52,27 +51,35 @@ def beside_lines(
     """The same of signals and what reads their runs at full rate, one run at a time."""
     most = TUNING.orders.most_samples // max(len(signals), 1)
     pairs = list(zip(signals, reads, strict=True))
-    runs = [steady_readings(known, read(), most) for known, read in pairs]
+    runs = [steady_readings(known, read(), most, torque_constant) for known, read in pairs]
 
     lines = lines_of(runs[reference:], runs[:reference])
     if not lines.every:
         return list(signals), lines
     beside = [restored(known, read(), lines) for known, read in pairs]
-    line = guide(lines)
-    beside[reference:] = aligned(beside[reference:], line)
-    lines = replace(lines, aligned=line.at if line else 0.0)
-    return beside, lines.renamed("current", "torque", torque_constant)
+    beside[reference:], lines = aligned(beside[reference:], lines)
+    return beside, lines
 
 
-def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Samples]:
-    """Readings of each channel while the wheel drives steadily, at most so many; of a table of
-    steady states none.
+def steady_readings(
+    signals: Signals, full: FullRate, most: int, torque_constant: float
+) -> dict[str, Samples]:
+    """Readings of each channel while the wheel drives steadily, at most so many, the current as the
+    motor's torque; of a table of steady states none.
     """
     if signals.info.steady_states:
         return {}
-    since = {name: _since(signals, read) for name, read in full.items() if name != "temperature"}
+    since = {channel_of(n): _since(signals, read) for n, read in full.items() if n != "temperature"}
     angle = since.pop("wheel_encoder")
+    if "torque" in since:
+        time, current = since["torque"]
+        since["torque"] = time, torque_constant * current
     return steady_samples(_motion(signals), angle, since, most)
+
+
+def channel_of(name: str) -> str:
+    """The channel in which a reading is compared."""
+    return "torque" if name == "current" else name
 
 
 def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
@@ -84,21 +91,26 @@ def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
     edges = _edges(signals.time)
     analogue = dict(signals.analogue)
 
-    for name in set(analogue) & {line.channel for line in lines.every}:
-        read = _since(signals, full[name])
-        less, ripple = on_grid(lines.of(name), motion, angle, read, signals.time)
+    shown = {line.channel for line in lines.every}
+    for name in (n for n in signals.analogue if channel_of(n) in shown):
+        own, read = lines.of(channel_of(name)), _since(signals, full[name])
+        less, ripple = on_grid(own, motion, angle, read, signals.time)
         analogue[name] = block_mean(*less, edges) + ripple
     return replace(signals, analogue=analogue)
 
 
-def aligned(signals: Sequence[Signals], line: SpectralLine | None) -> list[Signals]:
-    """Runs of the new campaign with wheel angles that count from one angle, as a ripple tells."""
+def aligned(signals: Sequence[Signals], lines: Lines) -> tuple[list[Signals], Lines]:
+    """Runs of the new campaign with wheel angles that count from one angle, as a ripple of its
+    lines tells, and the lines with what aligned them.
+    """
+    line = guide(lines)
     if line is None:
-        return list(signals)
+        return list(signals), lines
     moved = shifts(line).tolist()
-    return [
+    turned = [
         replace(s, wheel_angle=s.wheel_angle + by) for s, by in zip(signals, moved, strict=True)
     ]
+    return turned, replace(lines, aligned=line.at)
 
 
 def _motion(signals: Signals) -> GridMotion:

@@ -17,19 +17,16 @@ from gritd.tools.diagnose.rig.interface import GridRun
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def height_of(settings: Settings) -> float:
-    """Standard deviation of a surface [m]: as `bed.repeatability` states it, else the usual one."""
-    return settings.bed.repeatability.surface or TUNING.rig.relief
-
-
 def reliefs_of(
-    runs: Sequence[GridRun], channels: Sequence[str], height: float
+    runs: Sequence[GridRun], channels: Sequence[str], settings: Settings
 ) -> Iterator[list[Mapping[str, Array]]]:
     """Of each run and each wave of its surface, per run what every channel (n,) reads of it, one
-    standard deviation, in the channels' units. height: standard deviation of the surface [m].
+    standard deviation, in the channels' units. Surfaces are as high as `bed.repeatability` states
+    it, else as usual.
     """
     if "sinkage" not in channels:
         return
+    height = settings.bed.repeatability.surface or TUNING.rig.relief
     nothing: list[Mapping[str, Array]] = [
         {channel: np.zeros(run.time.size) for channel in channels} for run in runs
     ]

@@ -15,7 +15,6 @@ from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
-from gritd.tools.diagnose.orders.phases import guide
 from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import (
     UNITS,
@@ -47,7 +46,7 @@ from gritd.tools.diagnose.rig.motion_error import errors_of_motion
 from gritd.tools.diagnose.rig.prediction import Prediction
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import Recorded, measured_of, recorded, to_one_side
-from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
+from gritd.tools.diagnose.rig.relief import reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, WeightSets
 from gritd.tools.diagnose.tuning import TUNING
@@ -114,7 +113,7 @@ def wheel_rig(
     held = _held(data, settings, runs)
     prediction = Prediction(acting, data, constants, tuple(prepared), held)
     motion_sigma, unrest = errors_of_motion(prediction.channels, constants, data, settings)
-    surfaces = reliefs_of(runs, data.channels, height_of(settings)) if anew else ()
+    surfaces = reliefs_of(runs, data.channels, settings) if anew else ()
 
     return Rig(
         runs=runs,
@@ -218,9 +217,8 @@ def _reference_alone(
 ) -> Rig:
     """Its runs and lines as those of a campaign of its own."""
     own = Lines(lines.reference, configured=lines.configured)
-    line = guide(own)
-    own = replace(own, aligned=line.at if line else 0.0)
-    return wheel_rig(aligned(signals, line), settings, read_off=read_off, lines=own)
+    signals, own = aligned(signals, own)
+    return wheel_rig(signals, settings, read_off=read_off, lines=own)
 
 
 def _left_out(known: Sequence[ConfiguredEffect], weights_stated: bool) -> set[str]:

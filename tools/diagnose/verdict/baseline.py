@@ -20,7 +20,8 @@ of fit/shared.py.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
+
+import numpy as np
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects.base import Effect
@@ -28,8 +29,8 @@ from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import HAD, Rig
+from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
@@ -46,18 +47,31 @@ def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ..
     model = decision.best
     sure = [name for name in model.names if not decision.groups[name]]
     lasting = [n for n in sure if _lasts(rig.effects[n])]
-    return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in lasting)
+    return _configured(model, lasting)
 
 
 def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[ConfiguredEffect, ...]:
-    """What the reference is likeliest to show, if both campaigns are no less likely with it than
-    without what is new; as fitted to both. of_reference: None where there is none.
+    """What the reference is likeliest to show, where that is likelier to be there than to be
+    resembled, if both campaigns are likelier with it; as fitted to both. of_reference: None where
+    there is none.
     """
-    shown = [w for w in of_reference.weighed if w.names] if of_reference else []
-    if not shown:
+    named = [w for w in of_reference.weighed if w.names] if of_reference else []
+    likeliest = max(named, key=lambda w: w.probability, default=None)
+    if likeliest is None or not all(_likely(trust) for trust in likeliest.trusts.values()):
         return ()
-    likeliest = max(shown, key=lambda w: w.probability)
-    return _in_both(base, base.model, [(likeliest.model.fitted, likeliest.names)])
+    found = _in_both(base, likeliest.model, likeliest.names)
+    without = _in_both(base, base.model, ()) if found else None
+    if found is None or without is None:
+        return ()
+    gain, count = np.array([found.evidence - without.evidence]), np.array([len(likeliest.names)])
+    by = learnt(len(base.problem.stack.rig.effects), referred=True)
+    likelier = by.weights(gain, count, np.zeros(1))[0] > 0.0
+    return _configured(found, likeliest.names) if likelier else ()
+
+
+def _likely(trust: float) -> bool:
+    """Likelier to be there than to be resembled."""
+    return trust > 1.0 - trust
 
 
 def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...]:
@@ -66,32 +80,27 @@ def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...
     """
     if not base.problem.stack.referred:
         return ()
-    return _in_both(base, accepted, [(accepted.fitted, (name,)) for name in accepted.names])
+    tried = [(_in_both(base, accepted, (name,)), name) for name in accepted.names]
+    found = [(model, name) for model, name in tried if model is not None]
+    best, name = max(found, key=lambda one: one[0].evidence, default=(accepted, ""))
+    return _configured(best, (name,)) if name and best.evidence >= accepted.evidence else ()
 
 
-def _in_both(
-    base: BaseFit, than: Model, tried: Sequence[tuple[Fitted, tuple[str, ...]]]
-) -> tuple[ConfiguredEffect, ...]:
-    """The likeliest of fits whose effects of some names act in both campaigns, if it is no less
-    likely than a model.
+def _in_both(base: BaseFit, of: Model, names: Sequence[str]) -> Model | None:
+    """A model's effects fitted, those of some names in both campaigns; None where one of these does
+    not last, or both have it already.
     """
-    rig = base.problem.stack.rig
+    rig, fitted = base.problem.stack.rig, of.fitted
     had = {constant.parameter[0] for constant in rig.constants if constant.kind == HAD}
-    found: list[tuple[Model, tuple[str, ...]]] = []
-    for fitted, names in tried:
-        if all(_lasts(rig.effects[name]) and name not in had for name in names):
-            model = attempted(partial(_shared, base, fitted, names))
-            found += [(model, names)] if model is not None else []
-
-    best, names = max(found, key=lambda one: one[0].evidence, default=(than, ()))
-    if best.evidence < than.evidence:
-        return ()
-    return tuple(ConfiguredEffect(name, dict(_parameters(best, name))) for name in names)
-
-
-def _shared(base: BaseFit, fitted: Fitted, names: Sequence[str]) -> Model:
+    if not all(_lasts(rig.effects[name]) and name not in had for name in names):
+        return None
     problem, begins = base.problem.in_both(names), (base.fitted.u, fitted.x)
-    return fit_model(problem, base.forms, fitted.effects, fitted.free, begins, base.model.sizes)
+    effects, free, sizes = fitted.effects, fitted.free, base.model.sizes
+    return attempted(lambda: fit_model(problem, base.forms, effects, free, begins, sizes))
+
+
+def _configured(model: Model, names: Sequence[str]) -> tuple[ConfiguredEffect, ...]:
+    return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in names)
 
 
 def _lasts(effect: type[Effect]) -> bool:

@@ -98,7 +98,8 @@ def judged(
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
     to be there than to be resembled, and likelier than that nothing of the list is there; and all
-    only where runs that were held out are predicted better with them.
+    only where runs that were held out are predicted better with them. Else their evidence misleads,
+    which is as likely as it is in general.
     """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
@@ -116,8 +117,10 @@ def judged(
     named, share = _named(search, best, kept)
     whole = beside[named] if named in beside else _with_unexplained(search, named)
     predicts = not named.names or _predicts(search, whole.model if whole is not None else named)
-    if not predicts:
+    if not predicts:  # its evidence misleads
         named, share, whole = search.bare, 0.0, beside.get(search.bare)
+        every = tuple(_distrusted(w, kept, calibration.lapse) for w in every)
+        probability, unlisted = _probabilities(every), _unlisted(every)
 
     return Decision(
         "explained" if named.names else "unlisted",
@@ -134,6 +137,12 @@ def judged(
             if name not in named.names and _likely(_together(every)[frozenset(best.names)])
         ),
     )
+
+
+def _distrusted(of: WeighedExplanation, names: Sequence[str], most: float) -> WeighedExplanation:
+    """An explanation whose effects of some names are trusted so far at most."""
+    trusts = of.trusts.items()
+    return replace(of, trust=tuple(min(t, most) if name in names else t for name, t in trusts))
 
 
 def _likely(probability: float) -> bool:

@@ -137,6 +137,7 @@ def test_what_predicts_unseen_runs_worse_is_not_named(names_alone: None) -> None
     found = _judged(900.0, 200.0, 0.9, parameters=0)
     assert found.verdict == "unlisted" and found.best.names == () and found.share == 0.0
     assert [(r.name, r.predicts) for r in found.resembled] == [("a", False)]
+    assert found.probability["a"] < 0.5 < found.unlisted
 
 
 def test_no_name_is_stated_that_is_less_likely_than_none(names_alone: None) -> None:

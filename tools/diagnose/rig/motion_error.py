@@ -113,7 +113,7 @@ def changes_of(load: Array) -> tuple[Array, Array]:
     slow ones beside the run's level; 0 where other weights hang on the axle, or none.
     """
     level = _level(load)
-    near = np.abs(load - level) <= TUNING.rig.close_load * level
+    near = np.abs(load - level) <= TUNING.rig.other_weights * level
     logarithm = np.log(np.where(near, load, level))
     slow = median_filter(logarithm, TUNING.rig.unrest_values, mode="nearest")
     quick = np.where(near, logarithm - slow, 0.0)
@@ -125,7 +125,7 @@ def error_of_level(load: Array) -> float:
     colour of its noise: by the means of parts of the run.
     """
     level = _level(load)
-    near = load[np.abs(load - level) <= TUNING.rig.close_load * level]
+    near = load[np.abs(load - level) <= TUNING.rig.other_weights * level]
     if near.size < TUNING.rig.load_parts:
         return 0.0
     means = [float(part.mean()) for part in np.array_split(near, TUNING.rig.load_parts)]

@@ -4,7 +4,7 @@ forward model out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -97,7 +97,6 @@ def wheel_rig(
     left_out = _left_out(settings.effects, data.stated)
     settings = replace(settings, effects=_acting(settings.effects, data.stated))
     had = _acting(had, data.stated)
-    having = lambda more: again((*had, *more))  # noqa: E731
     acting = replace(settings, effects=(*settings.effects, *had))  # in both campaigns
 
     anew = bool(reference) and bed == "prepared"
@@ -127,7 +126,7 @@ def wheel_rig(
         smooth=SMOOTH,
         heated=("torque",),
         foresee=prediction.foresee,
-        having=having,
+        having=partial(_with_more, again, had),
         reference=alone if reference else None,
         baseline=configured(settings.effects),
         slipping="carriage_scale",
@@ -141,6 +140,15 @@ def wheel_rig(
         motion_sigma=motion_sigma,
         nuisances=() if data.tabled else (*unrest, *surfaces),
     )
+
+
+def _with_more(
+    again: Callable[[Sequence[ConfiguredEffect]], Rig],
+    had: Sequence[ConfiguredEffect],
+    more: Sequence[ConfiguredEffect],
+) -> Rig:
+    """The rig once more, with further effects beside those that it has in both campaigns."""
+    return again((*had, *more))
 
 
 def _held(data: Recorded, settings: Settings, runs: Sequence[GridRun]) -> Held | None:

@@ -83,6 +83,9 @@ class RigTuning:
     )
 
     # --- motion_error.py ---
+    other_weights: float = tuned(
+        0.25, "-", "relative distance from a run's level: beyond it, other weights hang on the axle"
+    )
     load_parts: int = tuned(8, "parts", "of a run, whose mean loads tell the error of all")
 
     # --- proposals.py ---
@@ -120,7 +123,7 @@ class RigTuning:
 
     # --- weights.py ---
     close_load: float = tuned(
-        0.15, "-", "relative distance of two loads: beyond it, other weights hang on the axle"
+        0.15, "-", "relative distance of two loads at which both mean the same"
     )
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
     doubt: float = tuned(

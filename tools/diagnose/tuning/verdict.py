@@ -54,6 +54,12 @@ class Verdict:
         "of the form error of an effect that something resembles",
         COUNTED,
     )
+    worse: float = tuned(
+        0.25,
+        "odds",
+        "of an effect there against one resembled, where unseen runs are predicted worse with it",
+        "some 140 names of sealed campaigns: one in 15 right ones, one in 4 wrong ones",
+    )
     alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be distinguished")
     rivals: int = tuned(
         3, "models", "of a size, beside which what has no name is fitted", "run time"

@@ -26,7 +26,7 @@ from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, w
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
-from gritd.tools.diagnose.verdict.resemblance import trusted
+from gritd.tools.diagnose.verdict.resemblance import doubted, trusted
 from gritd.tools.diagnose.verdict.unexplained import UnexplainedTerms, unexplained_with
 
 
@@ -97,9 +97,8 @@ def judged(
     calibration: OddsCalibration,
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
-    to be there than to be resembled, and likelier than that nothing of the list is there; and all
-    only where runs that were held out are predicted better with them. Else their evidence misleads,
-    which is as likely as it is in general.
+    to be there than to be resembled, and likelier than that nothing of the list is there. Where
+    runs that were held out are predicted worse with what would be accepted, it is less likely.
     """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
@@ -109,40 +108,45 @@ def judged(
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    probability, unlisted = _probabilities(every), _unlisted(every)
     best = _best([w for w in every if w.names] or every)
-    trust = _trust(every, best)
-    least = {n: min(trust[n], best.trusts[n]) for n in best.names}  # in what is reported, too
-    kept = [n for n in best.names if _likely(least[n]) and probability[n] > unlisted]
-    named, share = _named(search, best, kept)
-    whole = beside[named] if named in beside else _with_unexplained(search, named)
-    predicts = not named.names or _predicts(search, whole.model if whole is not None else named)
-    if not predicts:  # its evidence misleads
-        named, share, whole = search.bare, 0.0, beside.get(search.bare)
-        every = tuple(_distrusted(w, kept, calibration.lapse) for w in every)
-        probability, unlisted = _probabilities(every), _unlisted(every)
+    likely = _accepted(every, best)
+    named, share, whole = _named(search, best, likely, beside)
+    if named.names and not _predicts(search, whole.model if whole is not None else named):
+        every = tuple(_doubted(w, likely) for w in every)
+        named, share, whole = _named(search, best, _accepted(every, best), beside)
 
     return Decision(
         "explained" if named.names else "unlisted",
         named,
         share,
         whole,
-        probability,
-        unlisted,
+        _probabilities(every),
+        _unlisted(every),
         _groups(every, named if named.names else best.model),
         every,
         tuple(
-            Resembled(name, best.share, best.model.form_share(name), predicts or name not in kept)
+            Resembled(name, best.share, best.model.form_share(name), name not in likely)
             for name in best.names
             if name not in named.names and _likely(_together(every)[frozenset(best.names)])
         ),
     )
 
 
-def _distrusted(of: WeighedExplanation, names: Sequence[str], most: float) -> WeighedExplanation:
-    """An explanation whose effects of some names are trusted so far at most."""
+def _accepted(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> list[str]:
+    """Names of the best explanation that are accepted, by how far they are to be trusted in it and
+    in all explanations by the same effects.
+    """
+    own = next(w for w in weighed if w.model is best.model and not w.nameless)
+    trust = _trust(weighed, best)
+    probability, unlisted = _probabilities(weighed), _unlisted(weighed)
+    least = {name: min(trust[name], own.trusts[name]) for name in best.names}
+    return [n for n in best.names if _likely(least[n]) and probability[n] > unlisted]
+
+
+def _doubted(of: WeighedExplanation, names: Sequence[str]) -> WeighedExplanation:
+    """An explanation whose effects of some names predict unseen runs worse."""
     trusts = of.trusts.items()
-    return replace(of, trust=tuple(min(t, most) if name in names else t for name, t in trusts))
+    return replace(of, trust=tuple(doubted(t) if n in names else t for n, t in trusts))
 
 
 def _likely(probability: float) -> bool:
@@ -171,16 +175,22 @@ def trusting(
 
 
 def _named(
-    search: EffectSearch, best: WeighedExplanation, kept: Sequence[str]
-) -> tuple[Model, float]:
-    """The model of the names that are accepted, and the share that they take."""
+    search: EffectSearch,
+    best: WeighedExplanation,
+    kept: Sequence[str],
+    beside: Mapping[Model, UnexplainedTerms | None],
+) -> tuple[Model, float, UnexplainedTerms | None]:
+    """The model of the names that are accepted, the share that they take, and what has no name
+    beside it.
+    """
     model = best.model
     for name in best.names:
         if name not in kept:
             model = without(search, model, name)
-    if model is best.model:
-        return model, best.share
-    return model, taken_share(search, model) if model.names else 0.0
+    share = best.share if model is best.model else 0.0
+    if model.names and model is not best.model:
+        share = taken_share(search, model)
+    return model, share, beside[model] if model in beside else _with_unexplained(search, model)
 
 
 def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:

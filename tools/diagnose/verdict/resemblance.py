@@ -11,7 +11,8 @@ lesser share s. With the share λ of explanations that mislead (calibration.py)
 
 where p(h, s | …) = p(h | …) k sᵏ⁻¹. L is not tempered as evidence between explanations is: both
 priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
-of it h says nothing.
+of it h says nothing. Where runs that were held out are predicted worse with the effect, its odds
+are lower: of what only resembles it that is oftener so.
 """
 
 from __future__ import annotations
@@ -41,6 +42,12 @@ def believed(likelihood: Array, share: float, lapse: float) -> float:
     there = (1.0 - lapse) * _of_share(share, TUNING.verdict.share_power) * float(likelihood @ own)
     alike = lapse * _of_share(share, TUNING.verdict.share_power_other) * float(likelihood @ other)
     return float(there / max(there + alike, SPAN))
+
+
+def doubted(trust: float) -> float:
+    """The probability of what predicts unseen runs worse than no effect does."""
+    odds = TUNING.verdict.worse * trust / max(1.0 - trust, SPAN)
+    return odds / (1.0 + odds)
 
 
 def _of_share(share: float, power: float) -> float:

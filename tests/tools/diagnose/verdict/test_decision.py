@@ -132,12 +132,15 @@ def test_what_is_likelier_resembled_than_there_is_not_named(
     assert [(r.name, r.share, r.forms) for r in found.resembled] == [("a", 0.9, 0.4)]
 
 
-def test_what_predicts_unseen_runs_worse_is_not_named(names_alone: None) -> None:
-    """However likely: as well as without it is not better."""
-    found = _judged(900.0, 200.0, 0.9, parameters=0)
+def test_what_predicts_unseen_runs_worse_is_less_likely(names_alone: None) -> None:
+    """As well as without it is not better."""
+    found = _judged(900.0, 200.0, 0.7, parameters=0)
     assert found.verdict == "unlisted" and found.best.names == () and found.share == 0.0
     assert [(r.name, r.predicts) for r in found.resembled] == [("a", False)]
     assert found.probability["a"] < 0.5 < found.unlisted
+
+    sure = _judged(900.0, 200.0, 0.9, parameters=0)
+    assert sure.best.names == ("a",) and 0.5 < sure.probability["a"] < 0.8
 
 
 def test_no_name_is_stated_that_is_less_likely_than_none(names_alone: None) -> None:

@@ -33,6 +33,7 @@ from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
+from gritd.tools.diagnose.verdict.resemblance import likely
 
 PASSING = {*BEYOND_FORM, TURNING}
 
@@ -57,7 +58,7 @@ def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[Config
     """
     named = [w for w in of_reference.weighed if w.names] if of_reference else []
     likeliest = max(named, key=lambda w: w.probability, default=None)
-    if likeliest is None or not all(_likely(trust) for trust in likeliest.trusts.values()):
+    if likeliest is None or not all(likely(trust) for trust in likeliest.trusts.values()):
         return ()
     found = _in_both(base, likeliest.model, likeliest.names)
     without = _in_both(base, base.model, ()) if found else None
@@ -67,11 +68,6 @@ def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[Config
     by = learnt(len(base.problem.stack.rig.effects), referred=True)
     likelier = by.weights(gain, count, np.zeros(1))[0] > 0.0
     return _configured(found, likeliest.names) if likelier else ()
-
-
-def _likely(trust: float) -> bool:
-    """Likelier to be there than to be resembled."""
-    return trust > 1.0 - trust
 
 
 def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...]:

@@ -26,7 +26,7 @@ from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, w
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
-from gritd.tools.diagnose.verdict.resemblance import doubted, trusted
+from gritd.tools.diagnose.verdict.resemblance import doubted, likely, trusted
 from gritd.tools.diagnose.verdict.unexplained import UnexplainedTerms, unexplained_with
 
 
@@ -109,10 +109,10 @@ def judged(
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
     best = _best([w for w in every if w.names] or every)
-    likely = _accepted(every, best)
-    named, share, whole = _named(search, best, likely, beside)
+    first = _accepted(every, best)
+    named, share, whole = _named(search, best, first, beside)
     if named.names and not _predicts(search, whole.model if whole is not None else named):
-        every = tuple(_doubted(w, likely) for w in every)
+        every = tuple(_doubted(w, first) for w in every)
         named, share, whole = _named(search, best, _accepted(every, best), beside)
 
     return Decision(
@@ -125,9 +125,9 @@ def judged(
         _groups(every, named if named.names else best.model),
         every,
         tuple(
-            Resembled(name, best.share, best.model.form_share(name), name not in likely)
+            Resembled(name, best.share, best.model.form_share(name), name not in first)
             for name in best.names
-            if name not in named.names and _likely(_together(every)[frozenset(best.names)])
+            if name not in named.names and likely(_together(every)[frozenset(best.names)])
         ),
     )
 
@@ -140,18 +140,13 @@ def _accepted(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -
     trust = _trust(weighed, best)
     probability, unlisted = _probabilities(weighed), _unlisted(weighed)
     least = {name: min(trust[name], own.trusts[name]) for name in best.names}
-    return [n for n in best.names if _likely(least[n]) and probability[n] > unlisted]
+    return [n for n in best.names if likely(least[n]) and probability[n] > unlisted]
 
 
 def _doubted(of: WeighedExplanation, names: Sequence[str]) -> WeighedExplanation:
     """An explanation whose effects of some names predict unseen runs worse."""
     trusts = of.trusts.items()
     return replace(of, trust=tuple(doubted(t) if n in names else t for n, t in trusts))
-
-
-def _likely(probability: float) -> bool:
-    """Likelier than not."""
-    return probability > 1.0 - probability
 
 
 def _with_unexplained(search: EffectSearch, model: Model) -> UnexplainedTerms | None:
@@ -201,10 +196,10 @@ def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
     together = _together(weighed)
     plain = [w for w in weighed if len(w.names) == size and not w.nameless]
-    likely = {id(w): together[frozenset(w.names)] for w in plain}
-    equal = max(likely.values()) / TUNING.verdict.equally_likely
-    simple = [w for w in plain if likely[id(w)] >= equal]
-    return min(simple, key=lambda w: (_parameters(w.model), -likely[id(w)]))
+    chance = {id(w): together[frozenset(w.names)] for w in plain}
+    equal = max(chance.values()) / TUNING.verdict.equally_likely
+    simple = [w for w in plain if chance[id(w)] >= equal]
+    return min(simple, key=lambda w: (_parameters(w.model), -chance[id(w)]))
 
 
 def _parameters(model: Model) -> int:

@@ -44,6 +44,11 @@ def believed(likelihood: Array, share: float, lapse: float) -> float:
     return float(there / max(there + alike, SPAN))
 
 
+def likely(probability: float) -> bool:
+    """Likelier than not."""
+    return probability > 1.0 - probability
+
+
 def doubted(trust: float) -> float:
     """The probability of what predicts unseen runs worse than no effect does."""
     odds = TUNING.verdict.worse * trust / max(1.0 - trust, SPAN)

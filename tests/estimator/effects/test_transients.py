@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,29 @@ def test_running_in_starts_shallow_with_more_torque() -> None:
     assert found.torque[0] / plain.torque[0] == pytest.approx(1.2, abs=0.01)
     left = np.exp(-np.asarray(motion.carriage_position)[-1] / 0.05)
     assert found.sinkage[-1] / plain.sinkage[-1] == pytest.approx(1.0 - 0.35 * left)
+
+
+@pytest.mark.parametrize(
+    ("order", "gone"),
+    [(0.0, lambda x: 1.0 - (1.0 - np.exp(-1.0)) * x), (2.0, lambda x: 1.0 / (1.0 + 1.718282 * x))],
+)
+def test_running_in_is_a_straight_line_or_a_hyperbola_by_its_order(
+    order: float, gone: Callable[[Array], Array]
+) -> None:
+    motion = driven(np.full(1000, 60.0), np.full(1000, 0.3), np.full(1000, 0.3))
+    starting = make("running_in", {"shallow": 0.35, "length": 0.05, "order": order})
+    found, plain = (simulate_arrays(WHEEL, SOIL, motion, some) for some in ((starting,), ()))
+    left = np.maximum(gone(np.abs(np.asarray(motion.carriage_position)) / 0.05), 0.0)
+    np.testing.assert_allclose(found.sinkage / plain.sinkage, 1.0 - 0.35 * left, atol=1e-6)
+
+
+def test_what_the_rim_shears_more_at_the_start_it_also_pushes_with() -> None:
+    motion = driven(np.full(1000, 60.0), np.full(1000, 0.3), np.full(1000, 0.3))
+    starting = make("running_in", {"torque": 0.2})
+    found, plain = (simulate_arrays(WHEEL, SOIL, motion, some) for some in ((starting,), ()))
+    more = found.drawbar_pull - plain.drawbar_pull
+    np.testing.assert_allclose(more, (found.torque - plain.torque) / WHEEL.radius, rtol=1e-9)
+    assert more[0] > 0.1
 
 
 def test_the_motor_turns_freely_through_the_gap_after_each_reversal() -> None:

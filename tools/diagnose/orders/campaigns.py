@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
+from math import gcd
 
 import numpy as np
 
@@ -61,15 +63,17 @@ class Lines:
 
     def orders(self, low: float, high: float) -> list[float]:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported
-        first; those far behind it are left out.
+        first; those far behind it are left out. Then what two of them may be harmonics of, though
+        it does not stand out itself: it is slower, so fewer of it were seen.
         """
         standing: list[SpectralLine] = []
-        inside = (line for line in self.fresh() if low <= line.at <= high)
+        inside = [line for line in self.fresh() if low <= line.at <= high]
         for line in sorted(inside, key=lambda x: (-x.support, x.sigma)):
             least = standing[0].support - TUNING.orders.behind if standing else -np.inf
             if line.support > least and not any(_near(line, other) for other in standing):
                 standing.append(line)
-        return [line.at for line in standing]
+        roots = (root for one, other in combinations(inside, 2) for root in _roots(one, other))
+        return [*(line.at for line in standing), *sorted({x for x in roots if low <= x})]
 
 
 NO_LINES = Lines()
@@ -87,6 +91,22 @@ def lines_of(new: Runs, reference: Runs = ()) -> Lines:
 def same(one: SpectralLine, other: SpectralLine) -> bool:
     """Whether two lines of a channel are one, in two campaigns."""
     return one.channel == other.channel and one.axis == other.axis and _near(one, other)
+
+
+def _roots(one: SpectralLine, other: SpectralLine) -> list[float]:
+    """Ripples a turn of which two lines may be harmonics, as many as a ripple may have besides."""
+    lower, upper = sorted((one, other), key=lambda line: line.at)
+    numbers = combinations(range(2, TUNING.fit.harmonics + 2), 2)
+    return [
+        upper.at / over
+        for under, over in numbers
+        if gcd(under, over) == 1 and _near(_times(lower, over), _times(upper, under))
+    ]
+
+
+def _times(line: SpectralLine, factor: int) -> SpectralLine:
+    """A harmonic of a line, as well known as the line tells."""
+    return replace(line, at=factor * line.at, sigma=factor * line.sigma)
 
 
 def _near(one: SpectralLine, other: SpectralLine) -> bool:

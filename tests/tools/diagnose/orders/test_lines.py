@@ -140,3 +140,13 @@ def test_a_hub_that_lifts_once_a_turn_is_a_line_where_the_run_is_long() -> None:
     assert (line.channel, line.axis) == ("sinkage", "angle")
     assert abs(line.at - 1.0) < 4.0 * line.sigma
     assert line.size == pytest.approx(np.hypot(0.2, 0.3), rel=0.1)
+
+
+def test_two_harmonics_propose_the_ripple_of_which_they_are() -> None:
+    found = lines_of(campaign(_runs(6, ripple=(0.2, 0.0, 41.0))))
+    (line,) = found.new
+    third, fourth = (replace(line, at=at, support=50.0) for at in (18.04, 24.05))
+    proposed = replace(found, new=(third, fourth)).orders(2.0, 200.0)
+    assert proposed[:2] == [18.04, 24.05]
+    assert any(order == pytest.approx(6.01, abs=0.01) for order in proposed)
+    assert replace(found, new=(third, replace(fourth, at=29.3))).orders(2.0, 200.0)[2:] == []

@@ -83,10 +83,10 @@ class RollingContact(PlantEffect):
 
 @dataclass(frozen=True)
 class BowWave(PlantEffect):
-    """A run begins with f W more pull, which falls as 1/(1 + s/λ)² over its way s, and with the
-    wheel d i higher, d a twentieth of the radius at f = 0.1.
+    """A run begins with f W more pull, which falls as 1 − √(s/(4 λ)) over its way s until it is
+    gone, and with the wheel d i higher, d a twentieth of the radius at f = 0.1.
 
-    Source: none published; a heap that grows as it is pushed along.
+    Source: none published; a heap of one slope is as high as the root of the soil pushed into it.
     """
 
     length: float = 0.05  # λ [m]
@@ -99,7 +99,7 @@ class BowWave(PlantEffect):
 
     def fading(self, path: Array) -> Array:
         """Share (n,) that is left after a way (n,) [m]."""
-        return np.asarray((1.0 + path / self.length) ** -2)
+        return np.asarray(np.maximum(1.0 - np.sqrt(path / (4.0 * self.length)), 0.0))
 
     def forces(self, scene: Scene) -> Scene:
         left = self.strength * self.fading(np.cumsum(steps_of(scene))) * scene.moving
@@ -113,11 +113,14 @@ class BowWave(PlantEffect):
 
 @dataclass(frozen=True)
 class FilledRut(BowWave):
-    """The same, falling as the straight line 1 − s/(3 λ) until it is gone."""
+    """The same, half of it falling as e^(−s/λ) and half as e^(−s/(5 λ)): the contact is new after
+    its length, the rut is full after several.
+    """
 
     def fading(self, path: Array) -> Array:
-        """1 − s/(3 λ) (n,), at least 0, dimensionless, after ways s (n,) [m]."""
-        return np.asarray(np.clip(1.0 - path / (3.0 * self.length), 0.0, 1.0))
+        """Share (n,) that is left after ways s (n,) [m]."""
+        lengths = (self.length, 5.0 * self.length)
+        return np.asarray(0.5 * np.exp(-path / lengths[0]) + 0.5 * np.exp(-path / lengths[1]))
 
 
 EFFECTS: tuple[type[PlantEffect], ...] = (SecondOrderRelaxation, RollingContact, BowWave, FilledRut)

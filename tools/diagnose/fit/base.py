@@ -17,7 +17,7 @@ from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.fit.ripples import line_columns
-from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
+from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.noise.saturated import Explainable
@@ -62,9 +62,7 @@ def explainable(rough: BaseFit) -> Explainable:
 
     signatures = raw_signatures(stack, fitted.u, fitted.predicted, others)
     leading = [s.columns for s in (*signatures, *smooth_signatures(stack))]
-    turning = ripple_columns(stack, stack.measured - fitted.predicted)
-    ripples = np.column_stack((turning, line_columns(stack)))
-    return Explainable(np.column_stack([*leading, fitted.raw]), ripples)
+    return Explainable(np.column_stack([*leading, fitted.raw]), line_columns(stack))
 
 
 def refit(rough: BaseFit, noise: Noise) -> BaseFit:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.orders.lines import SpectralLine
-from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.interface import Index, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -18,24 +20,30 @@ def restored(rig: Rig, channel: str) -> list[SpectralLine]:
     return [line for line in lines if line.axis == "angle" and not line.harmonic]
 
 
+def line_waves(
+    stack: Stack, of: Callable[[SpectralLine], bool] = lambda _: True
+) -> Iterator[tuple[SpectralLine, Index, Array]]:
+    """Lines for which `of` holds: on the values (n,) of each run and channel while the wheel turns,
+    cosine and sine (n, 2).
+    """
+    moving, angle = stack.covariate("speed") > 0.0, stack.covariate("wheel_angle")
+    for channel, number in stack.parts:
+        index = np.flatnonzero(stack.of(channel) & moving & (stack.run == number))
+        for line in restored(stack.rig, channel):
+            if index.size and of(line):
+                phase = line.at * angle[index]
+                yield line, index, np.column_stack((np.cos(phase), np.sin(phase)))
+
+
 def line_columns(stack: Stack, unheld: bool = False) -> Array:
     """Cosine and sine (N, m) of every such line, of each run its own; unheld: only of those that
     are too fast for the grid.
     """
-    moving, angle = stack.covariate("speed") > 0.0, stack.covariate("wheel_angle")
     columns = [np.zeros((stack.size, 0))]
-
-    for channel in stack.rig.channels:
-        own = stack.of(channel) & moving
-        for line in restored(stack.rig, channel):
-            if unheld and not _too_fast(stack.rig, line):
-                continue
-            phase = line.at * angle
-            for number in np.unique(stack.run[own]):
-                here = own & (stack.run == number)
-                waves = np.column_stack((np.cos(phase), np.sin(phase)))
-                columns.append(np.where(here[:, None], waves, 0.0))
-
+    for _, index, waves in line_waves(stack, lambda x: not unheld or _too_fast(stack.rig, x)):
+        own = np.zeros((stack.size, 2))
+        own[index] = waves
+        columns.append(own)
     return np.column_stack(columns)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
-from gritd.tools.diagnose.rig.interface import Index, Rig
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT, WAY
@@ -196,32 +196,3 @@ def highest_order(stack: Stack) -> float:
             min(TUNING.fit.order_nyquist * rate * 2.0 * np.pi / usual, TUNING.fit.most_orders)
         )
     )
-
-
-def ripple_columns(stack: Stack, residual: Array) -> Array:
-    """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after
-    the other.
-    """
-    orders = np.arange(TUNING.fit.lowest_ripple, highest_order(stack), TUNING.fit.ripple_spacing)
-    if not orders.size:
-        return np.zeros((stack.size, 0))
-
-    moving = stack.covariate("speed") > 0.0
-    angle, columns = stack.covariate("wheel_angle"), []
-
-    for channel in stack.rig.channels:
-        own = np.flatnonzero(stack.of(channel) & moving)
-        waves = np.exp(1j * np.outer(angle[own], orders))
-        left = residual[own] - np.mean(residual[own])
-        for _ in range(TUNING.fit.strongest_orders if own.size > TUNING.fit.ripple_values else 0):
-            best = waves[:, int(np.argmax(np.abs(left @ waves)))]
-            pair = np.column_stack((best.real, best.imag))
-            left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
-            columns += [_placed(part, own, stack.size) for part in (best.real, best.imag)]
-    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
-
-
-def _placed(values: Array, own: Index, size: int) -> Array:
-    out = np.zeros(size)
-    out[own] = values
-    return out

@@ -142,22 +142,13 @@ class FitTuning:
         0.3, "squares of the noise", "a direction that shows less is left out", "run time"
     )
     shared_most: int = tuned(150, "directions", "of all effects, at most", "run time")
-    standing_ripple: float = tuned(
-        15.0, "nats", "a ripple of the reference gains: some hundred orders are tried"
-    )
-    standing_orders: int = tuned(6, "orders", "of a channel of the reference that may stand out")
     calming_rounds: int = tuned(8, "fits", "of the ripples that leave the least absolute values")
-    ripple_shown: float = tuned(0.1, "-", "of a ripple that the grid must show", DAMPED)
 
     # --- signatures.py ---
     highest_order: float = tuned(200.0, "1/turn", "ripples")
     order_nyquist: float = tuned(0.45, "-", "of the grid's rate: faster ripples are damped", DAMPED)
     least_turns: float = tuned(1.5, "ripples", "a run must hold to be distinguished from a trend")
-    strongest_orders: int = tuned(3, "orders", "of a channel that do not count as its noise")
     most_orders: int = tuned(120, "orders", "tried at most", "run time")
-    lowest_ripple: float = tuned(3.0, "1/turn", "lower is no ripple of the noise")
-    ripple_spacing: float = tuned(0.25, "1/turn", "between ripples tried in the noise")
-    ripple_values: int = tuned(100, "values", "of a channel that ripples in the noise need")
     derivative_steps: tuple[float, ...] = tuned(
         (1.0, 0.1, 0.01), "choice", "of an expected size, the next where the effect runs away"
     )

@@ -102,12 +102,12 @@ def descend(
 
     unsure: where it stands, if its slopes are those of another place.
     """
-    here, damping, failed = start, TUNING.fit.damping_start, False
+    here, damping, failed = start, TUNING.numerics.damping_start, False
 
     for _ in range(rounds):
         better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
-            done = abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
+            done = abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
             if done and unsure is None:
                 return here, True
             if unsure is not None and (done or failed):  # by these slopes
@@ -118,21 +118,21 @@ def descend(
             tried, share, bent = None, 0.0, False
             if (expected := _gain(here, step)) > 0.0:  # bounds may cut a step into one that loses
                 tried, share, bent = _attempt(ground, here, step, expected, damping)
-            if share > TUNING.fit.fulfilled:
+            if share > TUNING.numerics.fulfilled:
                 better, failed = tried, False
-                softer = 1.0 / TUNING.fit.damping if share > TUNING.fit.good else 1.0
+                softer = 1.0 / TUNING.numerics.damping if share > TUNING.numerics.good else 1.0
                 damping = max(damping * softer, DAMPING_LEAST)
             else:
-                damping, failed = damping * TUNING.fit.damping, True
+                damping, failed = damping * TUNING.numerics.damping, True
 
         if better is None:
             return here, False
         here, unsure = ground.moved(here, better), better
-        if bent or share <= TUNING.fit.good:
+        if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
     if unsure is not None:
         here = ground.linearised(unsure)
-    return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
+    return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
 
 
 def _held(here: DescentPoint, bounds: CoordinateBounds) -> Bools:
@@ -147,8 +147,8 @@ def _attempt(
     """
     tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
     share = (here.nats - nats) / expected
-    if share > TUNING.fit.good or not np.isfinite(nats) or not ground.curved.any():
-        return tried, share, share <= TUNING.fit.good
+    if share > TUNING.numerics.good or not np.isfinite(nats) or not ground.curved.any():
+        return tried, share, share <= TUNING.numerics.good
 
     there = ground.moved(here, tried)
     follow = bounded_step(

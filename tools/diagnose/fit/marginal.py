@@ -143,7 +143,7 @@ class Marginal:
         weighted = [
             (w, *self._posterior(c, wanted))
             for w, c in zip(weight, ordered, strict=True)
-            if w > TUNING.fit.slight_size
+            if w > TUNING.numerics.slight_size
         ]
 
         total = sum(w for w, _, _ in weighted)

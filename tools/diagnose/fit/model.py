@@ -170,9 +170,9 @@ def fit_model(
     fitted = problem.with_terms(every, _values(every, sizes)).descend(
         effects, free, *start, near=near
     )
-    for number in range(TUNING.fit.size_rounds):
+    for number in range(TUNING.numerics.size_rounds):
         known = every
-        if number < TUNING.fit.form_rounds or _without_form_errors(fitted, every):
+        if number < TUNING.numerics.form_rounds or _without_form_errors(fitted, every):
             every = (*forms, *form_errors(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
@@ -180,7 +180,7 @@ def fit_model(
         beyond = marginal.gain(of_fit)
         sizes, evidence = marginal.likeliest(of_fit)
         done = beyond < TUNING.fit.last_step
-        if (done and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
+        if (done and sizes == of_fit) or number + 1 == TUNING.numerics.size_rounds:
             break
         fitted = problem.with_terms(every, _values(every, sizes)).refit(fitted)
 

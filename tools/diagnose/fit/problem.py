@@ -181,7 +181,7 @@ class Problem:
         if rounds == 0:  # as it stands there
             return ground.linearised(ground.tried(ground.at(u, x))[0])
 
-        most = TUNING.fit.rounds if rounds is None else rounds
+        most = TUNING.numerics.rounds if rounds is None else rounds
         begun = ground.begun(u, x)
         if near is None:
             fitted, converged = descent.descend(ground, ground.linearised(begun), most)
@@ -194,7 +194,7 @@ class Problem:
         """The nearest optimum from where a fit with other terms stands, first by its slopes."""
         ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
-        most = TUNING.fit.rounds if rounds is None else rounds
+        most = TUNING.numerics.rounds if rounds is None else rounds
         reached, converged = descent.descend(ground, ground.moved(fitted, start), most)
         return replace(reached, converged=converged)
 
@@ -259,7 +259,7 @@ class EffectsObjective:
         if not strong.any():
             return none
 
-        for halvings in range(TUNING.fit.halvings):
+        for halvings in range(TUNING.numerics.halvings):
             begun, nats = self.tried(self.at(u, np.where(strong, 0.5**halvings * x, x)))
             if nats <= most:
                 return begun
@@ -352,9 +352,9 @@ class EffectsObjective:
 
         for i in (i for i in range(first, centre.size) if i not in stack.partial):
             step = (
-                -TUNING.fit.step
-                if centre[i] + TUNING.fit.step > self.bounds.high[i]
-                else TUNING.fit.step
+                -TUNING.numerics.step
+                if centre[i] + TUNING.numerics.step > self.bounds.high[i]
+                else TUNING.numerics.step
             )
             moved = centre.copy()
             moved[i] += step

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.signatures import highest_order
+from gritd.tools.diagnose.fit.signatures import highest_order, resolved_order
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.rig.interface import Index, Rig
 from gritd.tools.diagnose.rig.stack import Stack
@@ -51,7 +51,8 @@ def orders_shown(stack: Stack, lowest: float) -> Array:
     """Ripples a turn (o,) that the grid shows: whole numbers, and those that stand on it as they
     are at its times.
     """
-    whole = np.arange(lowest, highest_order(stack))
+    least = max(lowest, np.ceil(resolved_order(stack.rig)))
+    whole = np.arange(least, min(highest_order(stack.rig), TUNING.fit.most_orders))
     lines = (x for channel in stack.rig.channels for x in restored(stack.rig, channel))
     more = [x.at for x in lines if x.at >= lowest]
     return np.unique(np.concatenate((whole, more)))
@@ -59,4 +60,4 @@ def orders_shown(stack: Stack, lowest: float) -> Array:
 
 def _too_fast(rig: Rig, line: SpectralLine) -> bool:
     rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
-    return line.frequency[1] > TUNING.fit.order_nyquist * rate
+    return line.frequency[1] > TUNING.orders.nyquist * rate

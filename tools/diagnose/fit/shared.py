@@ -103,7 +103,7 @@ def _least_absolute(columns: Array, values: Array) -> Array:
     """
     weights: Array = np.ones(values.size)
     share: Array = np.zeros(columns.shape[1])
-    for _ in range(TUNING.fit.calming_rounds):
+    for _ in range(TUNING.numerics.calming_rounds):
         root = np.sqrt(weights)
         share = np.asarray(np.linalg.lstsq(root[:, None] * columns, root * values, rcond=None)[0])
         off = np.abs(values - columns @ share)
@@ -145,7 +145,9 @@ def _reduced(columns: Array, whitened: Array) -> Array:
     if not columns.shape[1]:
         return columns
     values, vectors = np.linalg.eigh(whitened.T @ whitened)
-    large = np.flatnonzero(values > TUNING.fit.shared_least)[::-1][: TUNING.fit.shared_most]
+    large = np.flatnonzero(values > TUNING.numerics.shared_least)[::-1][
+        : TUNING.numerics.shared_most
+    ]
     return np.asarray(columns @ vectors[:, large])
 
 

@@ -24,7 +24,7 @@ Taken = TypeVar("Taken")
 def some_of(every: Iterable[Taken]) -> Iterator[list[Taken]]:
     """So many at a time that their columns are not all in memory at once."""
     taken = iter(every)
-    while some := list(islice(taken, TUNING.screen.at_once)):
+    while some := list(islice(taken, TUNING.numerics.at_once)):
         yield some
 
 
@@ -88,7 +88,7 @@ def _derivative(
     """Change of all values (N,) per expected size; by a smaller step where the full one runs away,
     as a motor may that heats the more the more current it draws; NaN where every step does.
     """
-    largest = TUNING.fit.runaway * np.abs(stack.measured).max(initial=0.0)
+    largest = TUNING.numerics.runaway * np.abs(stack.measured).max(initial=0.0)
 
     for step in TUNING.fit.derivative_steps:
         acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
@@ -149,23 +149,8 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     """
     if shown := rig.lines.orders(parameter.low, parameter.high):
         return shown
-    speed = np.concatenate(
-        [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
-    )
-    turning = speed[speed > TUNING.fit.turning_share * speed.max()] if speed.max() > 0.0 else speed
-
-    rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
-    highest = (
-        TUNING.fit.order_nyquist
-        * rate
-        * 2.0
-        * np.pi
-        / max(float(np.quantile(turning, TUNING.fit.usual_turning)), SLIGHT)
-    )
-
-    top = min(parameter.high, TUNING.fit.highest_order, highest)
+    top = min(parameter.high, highest_order(rig))
     least = max(parameter.low, TUNING.fit.least_turns * resolved_order(rig))
-
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // TUNING.fit.most_orders))]]
 
@@ -176,23 +161,13 @@ def resolved_order(rig: Rig) -> float:
     return 1.0 / max(turned, SLIGHT)
 
 
-def highest_order(stack: Stack) -> float:
-    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where the wheel hardly
-    turns.
-    """
-    run = stack.rig.runs[0]
-    rate = 1.0 / float(np.median(np.diff(run.time)))
+def highest_order(rig: Rig) -> float:
+    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where nothing turns."""
     speed = np.concatenate(
-        [np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs]
+        [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
     )
-
-    turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
-    turning = speed[speed > TUNING.fit.turning_share * speed.max()]
-    usual = float(np.quantile(turning, TUNING.fit.usual_turning)) if speed.max() > 0.0 else 1.0
-    return (
-        0.0
-        if turned < 2.0 * np.pi
-        else float(
-            min(TUNING.fit.order_nyquist * rate * 2.0 * np.pi / usual, TUNING.fit.most_orders)
-        )
-    )
+    turning = speed[speed > TUNING.rig.creep * speed.max()]
+    if not turning.size:
+        return 0.0
+    rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
+    return TUNING.orders.nyquist * rate * 2.0 * np.pi / float(np.median(turning))

@@ -100,7 +100,7 @@ def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> s
     """
     kept, gain, scale = (np.squeeze(p, -1) for p in _recursion(gaps, [colour], beside))
     kept, gain = kept[..., 0], gain[..., 0]
-    forgotten = TUNING.noise.negligible * scale.min(initial=1.0)
+    forgotten = TUNING.numerics.negligible * scale.min(initial=1.0)
 
     slow, fast = np.zeros(gaps.size), np.zeros(gaps.size)
     values, rows, columns = [], [], []
@@ -110,7 +110,7 @@ def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> s
         innovation = float(lag == 0) - slow - fast
 
         weight = innovation / scale[lag:]
-        acting = np.flatnonzero(np.abs(weight) >= TUNING.noise.negligible).astype(np.int32)
+        acting = np.flatnonzero(np.abs(weight) >= TUNING.numerics.negligible).astype(np.int32)
         values.append(weight[acting])
         rows.append(acting + np.int32(lag))
         columns.append(acting)
@@ -135,7 +135,7 @@ def products_of_innovations(
     """
     acting = np.flatnonzero(columns.any(axis=0))
     recursion = _recursion(gaps, colours, beside)
-    rows = max(TUNING.noise.whitened_at_once // max(len(colours) * acting.size, 1), 1)
+    rows = max(TUNING.numerics.whitened_at_once // max(len(colours) * acting.size, 1), 1)
 
     own = np.zeros((len(colours), acting.size, acting.size))
     for piece in _innovations(columns[:, acting], recursion, rows):

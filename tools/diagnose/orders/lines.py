@@ -159,7 +159,7 @@ class _Channel:
     def refined(self, axis: str, place: int) -> float:
         """The likeliest place between its neighbours in the grid."""
         at, step = place * self.places[axis].spacing, self.places[axis].spacing
-        for _ in range(TUNING.orders.refinements):
+        for _ in range(TUNING.numerics.refinements):
             tried = at + step * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
             at = float(tried[int(np.argmax(self._gain(axis, place, tried)))])
             step *= 0.5
@@ -196,7 +196,7 @@ class _Channel:
         and Stoica (1996), IEEE Trans. Signal Process. 44, 281-295.
         """
         self._waves[axis, at] = [np.zeros(part.samples.values.size) for part in self.parts]
-        for _ in range(TUNING.orders.sweeps if len(self._waves) > 1 else 1):
+        for _ in range(TUNING.numerics.sweeps if len(self._waves) > 1 else 1):
             for line in reversed(self._waves):
                 self._retake(*line)
         self._renew()

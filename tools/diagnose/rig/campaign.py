@@ -99,7 +99,7 @@ class Campaign:
 
 def _recent(kept: dict[Hashable, T], key: Hashable, make: Callable[[], T]) -> T:
     """The value of a key, made where it is not among the last few."""
-    if key not in kept and len(kept) >= TUNING.rig.kept:
+    if key not in kept and len(kept) >= TUNING.numerics.kept:
         kept.pop(next(iter(kept)))
     kept[key] = value = kept.pop(key) if key in kept else make()
     return value

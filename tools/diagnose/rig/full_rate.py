@@ -49,7 +49,7 @@ def beside_lines(
     reference: int = 0,
 ) -> tuple[list[Signals], Lines]:
     """The same of signals and what reads their runs at full rate, one run at a time."""
-    most = TUNING.orders.most_samples // max(len(signals), 1)
+    most = TUNING.numerics.most_samples // max(len(signals), 1)
     pairs = list(zip(signals, reads, strict=True))
     runs = [steady_readings(known, read(), most, torque_constant) for known, read in pairs]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,8 +11,20 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Menu
 from gritd.tools.diagnose.tuning import TUNING
 
+Levels = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+# factors on the middle speed, slips, factors on the middle load; the least effort first
+LEVELS: Mapping[str, Levels] = {
+    "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
+    "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
+    "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
+    "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
+    "shifted_start": ((1.0,), (0.2,), (1.0,)),
+    "second_pass": ((1.0,), (0.2,), (1.0,)),
+    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
+    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
+}
 MENU = Menu(
-    driven=tuple(TUNING.rig.proposal_levels),
+    driven=tuple(LEVELS),
     along={
         "slip": "slip_step",
         "speed": "speed_step",
@@ -34,7 +46,7 @@ MENU = Menu(
 
 def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     """The motion of one experiment: its levels in turn, each for an equal time."""
-    speeds, slips, loads = TUNING.rig.proposal_levels[key]
+    speeds, slips, loads = LEVELS[key]
     time = np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.rate)) / TUNING.rig.rate
 
     middle_speed, middle_load = (

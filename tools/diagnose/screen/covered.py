@@ -20,7 +20,7 @@ def covered(stack: Stack) -> Bools:
     known = np.vstack([c[w != 0.0] for c, w, new in pairs if not new])
     if not known.size:  # next to its new load the reference carried nothing
         return np.zeros(stack.size, bool)
-    features = features_of(known, TUNING.screen.coverage_points, TUNING.screen.coverage_left)
+    features = features_of(known, TUNING.fit.form_features, TUNING.fit.form_left_out)
 
     inside = []
     for conditions, weight, _ in pairs:

@@ -214,12 +214,12 @@ def _of_signatures(
 
 def _amplitude(a: Array, b: Array) -> Array:
     """Linear estimate of strengths (p,)."""
-    return np.asarray(np.linalg.solve(a + TUNING.search.least_precision * np.eye(len(b)), b))
+    return np.asarray(np.linalg.solve(a + TUNING.numerics.least_precision * np.eye(len(b)), b))
 
 
 def _start(effect: type[Effect], made: Signature, amplitude: Array) -> Array:
     """Where the fit of an effect's parameters begins: strengths at their linear estimate (p,)."""
-    least = np.maximum(amplitude, TUNING.search.least_start)
+    least = np.maximum(amplitude, TUNING.numerics.least_start)
     amplitude = np.where(np.array(made.sign) > 0, least, amplitude)
 
     size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
@@ -227,5 +227,5 @@ def _start(effect: type[Effect], made: Signature, amplitude: Array) -> Array:
         size[p.name] if p.name in size else (made.fixed[p.name] - p.centre) / p.sigma
         for p in effect.parameters()
     ]
-    far = TUNING.search.farthest_start
+    far = TUNING.numerics.farthest_start
     return np.asarray(np.clip(np.array(values), -far, far))

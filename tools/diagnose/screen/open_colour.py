@@ -120,7 +120,7 @@ class OpenNoise:
         size = [1.0 for _ in parts]
 
         peaks: list[tuple[float, float]] = []
-        for _ in range(TUNING.screen.colour_sweeps):
+        for _ in range(TUNING.numerics.colour_sweeps):
             peaks = []
             for i, part in enumerate(parts):
                 others = [
@@ -141,7 +141,7 @@ class OpenNoise:
             gram[:, acting[:, None], acting], squares.log_det, squares.count
         )
         near = np.flatnonzero(
-            alone + self._prior > (alone + self._prior).max() - TUNING.screen.colour_near
+            alone + self._prior > (alone + self._prior).max() - TUNING.numerics.colour_near
         )
         rest = self._prior[near] - 0.5 * squares.log_det[near]
         return SuitableColours(gram[near], rest, variance[near], squares.count)

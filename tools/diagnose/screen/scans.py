@@ -289,7 +289,7 @@ def _refined(
     family: Family, problem: Problem, beside: Projection, place: int, shared: bool
 ) -> float:
     """The best frequency between two of the scan."""
-    near = family.at[place] + np.linspace(-1.0, 1.0, TUNING.screen.frequencies_near_best) * (
+    near = family.at[place] + np.linspace(-1.0, 1.0, TUNING.numerics.frequencies_near_best) * (
         family.at[1] - family.at[0] if family.at.size > 1 else 0.0
     )
     finer = waves(problem.stack, problem.noise, family.shape.channel, family.axis, near)

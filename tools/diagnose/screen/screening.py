@@ -173,13 +173,13 @@ class Screen:
     def strained(self) -> float:
         """Chance of a constant as far from what is known of it, in any of so many kinds."""
         far = 2.0 * float(ndtr(-self.strain))
-        return min(TUNING.screen.kinds * far, 1.0) if self.strain > TUNING.screen.beyond else 1.0
+        return min(TUNING.screen.kinds * far, 1.0) if self.strain > TUNING.rig.doubt else 1.0
 
     @property
     def on_grid(self) -> bool:
         """Whether something stands out on the grid, or a constant strains beyond belief."""
         outstanding = self.ratio > self.threshold and self.open > TUNING.screen.sure
-        return outstanding or self.strain > TUNING.screen.beyond
+        return outstanding or self.strain > TUNING.rig.doubt
 
     @property
     def alarmed(self) -> bool:

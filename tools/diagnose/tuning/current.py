@@ -10,6 +10,7 @@ from typing import Any
 from gritd.tools.diagnose.tuning.explain import Explain
 from gritd.tools.diagnose.tuning.fit import FitTuning
 from gritd.tools.diagnose.tuning.noise import NoiseTuning
+from gritd.tools.diagnose.tuning.numerics import Numerics
 from gritd.tools.diagnose.tuning.orders import Orders
 from gritd.tools.diagnose.tuning.rig import RigTuning
 from gritd.tools.diagnose.tuning.screen import ScreenTuning
@@ -21,6 +22,7 @@ from gritd.tools.diagnose.tuning.verdict import Verdict
 class Tuning:
     """The numbers of every room. Only `replaced` puts another room's numbers in."""
 
+    numerics: Numerics = field(default_factory=Numerics)
     orders: Orders = field(default_factory=Orders)
     rig: RigTuning = field(default_factory=RigTuning)
     noise: NoiseTuning = field(default_factory=NoiseTuning)

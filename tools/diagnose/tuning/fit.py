@@ -51,15 +51,6 @@ class FitTuning:
     )
 
     # --- descent.py ---
-    gain: float = tuned(
-        0.05, "nats", "a step that would gain less ends the descent: linear algebra tells the rest"
-    )
-    damping_start: float = tuned(1e-3, "-", "of the curvature: first damping")
-    damping: float = tuned(
-        5.0, "-", "factor on the damping after a step that failed; after a good one its inverse"
-    )
-    fulfilled: float = tuned(0.1, "-", "of the expected gain: a step is taken")
-    good: float = tuned(0.75, "share", "of the expected gain: the damping falls")
 
     # --- discrepancy.py ---
     form_sizes: tuple[float, ...] = tuned(
@@ -113,23 +104,12 @@ class FitTuning:
     band_spread: float = tuned(0.05, "-", "relative spread below which there are no bands")
 
     # --- marginal.py, model.py ---
-    slight_size: float = tuned(1e-3, "-", "weight of sizes below which they do not count")
-    size_rounds: int = tuned(
-        5, "rounds", "of fit and sizes in turn", "nearly always two are enough"
-    )
-    form_rounds: int = tuned(2, "rounds", "in which other forms are made anew where the fit stands")
     last_step: float = tuned(0.3, "nats", "that the evidence may count beyond where a fit stands")
 
     # --- problem.py ---
-    step: float = tuned(2e-3, "-", "of a prior σ or an expected size, for differences")
-    rounds: int = tuned(12, "rounds", "of a descent at most: sizes are learnt in between")
     far: float = tuned(8.0, "σ", "constants are kept this close to what is known of them")
     strength_prior: float = tuned(
         3.0, "-", "a strength's prior standard deviation, in expected sizes"
-    )
-
-    halvings: int = tuned(
-        7, "times", "the strengths of a new effect at its start, while it makes the fit worse"
     )
 
     # --- projection.py ---
@@ -138,21 +118,13 @@ class FitTuning:
     shared_sizes: tuple[float, ...] = tuned(
         (0.0, 0.3, 1.0, 3.0), "expected sizes", "of the library's effects in both campaigns"
     )
-    shared_least: float = tuned(
-        0.3, "squares of the noise", "a direction that shows less is left out", "run time"
-    )
-    shared_most: int = tuned(150, "directions", "of all effects, at most", "run time")
-    calming_rounds: int = tuned(8, "fits", "of the ripples that leave the least absolute values")
 
     # --- signatures.py ---
-    highest_order: float = tuned(200.0, "1/turn", "ripples")
-    order_nyquist: float = tuned(0.45, "-", "of the grid's rate: faster ripples are damped", DAMPED)
     least_turns: float = tuned(1.5, "ripples", "a run must hold to be distinguished from a trend")
     most_orders: int = tuned(120, "orders", "tried at most", "run time")
     derivative_steps: tuple[float, ...] = tuned(
         (1.0, 0.1, 0.01), "choice", "of an expected size, the next where the effect runs away"
     )
-    runaway: float = tuned(10.0, "-", "times the largest value measured: more runs away")
     relative_times: tuple[float, ...] = tuned(
         (0.1, 0.3, 1.0, 3.0), "-", "time constants tried, of the campaign's or the run's length"
     )
@@ -164,7 +136,3 @@ class FitTuning:
         (0.12, 0.25, 0.5, 0.75), "share", "of the bed that was driven: lengths tried"
     )
     patch_centres: int = tuned(13, "places", "along the bed that are tried")
-    turning_share: float = tuned(
-        0.05, "-", "of the largest speed: slower does not count as turning"
-    )
-    usual_turning: float = tuned(0.8, "quantile", "of the turning speed for the highest order")

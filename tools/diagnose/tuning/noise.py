@@ -29,10 +29,6 @@ class NoiseTuning:
 
     # --- colour.py ---
     fast_time: float = tuned(1.5, "intervals", "correlation time of the fast part")
-    negligible: float = tuned(
-        1e-5, "-", "weight of a value long past in an innovation: it is left out", "run time"
-    )
-    whitened_at_once: int = tuned(4_000_000, "numbers", "whitened at once", "memory")
 
     # --- estimate.py ---
     slow_times: tuple[float, ...] = tuned(
@@ -93,4 +89,3 @@ class NoiseTuning:
     slight_column: float = tuned(
         1e-4, "-", "of the residual: what changes less at its expected size is a solver's rounding"
     )
-    rank: float = tuned(1e-7, "-", "of the largest eigenvalue: smaller ones are dependent columns")

@@ -17,7 +17,6 @@ class Orders:
     changed: float = tuned(0.02, "-", "relative change of a speed or load within `apart`: a ramp")
     apart: float = tuned(0.3, "s", "over which a change of speed or load is looked for")
     change_noise: float = tuned(5.0, "σ", "of their own noise: less is no ramp")
-    most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
     longest_part: float = tuned(20.0, "turns", "a longer run is cut, each part its own phase")
 
     # --- spectrum.py ---
@@ -35,8 +34,6 @@ class Orders:
     # --- lines.py ---
     level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
     most_lines: int = tuned(16, "lines", "at most", "run time")
-    sweeps: int = tuned(3, "times", "all lines of a channel are estimated anew beside another")
-    refinements: int = tuned(8, "times", "a line's place is looked for more finely")
     prefer_angle: float = tuned(
         3.0, "nats", "at one speed a ripple of the wheel is also one in time: the wheel's is meant"
     )

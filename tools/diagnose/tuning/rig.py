@@ -12,18 +12,6 @@ PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
 FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}
 LEAST = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
-Levels = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
-# factors on the middle speed, slips, factors on the middle load; the least effort first
-LEVELS: Mapping[str, Levels] = {
-    "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
-    "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
-    "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
-    "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
-    "shifted_start": ((1.0,), (0.2,), (1.0,)),
-    "second_pass": ((1.0,), (0.2,), (1.0,)),
-    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
-    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
-}
 
 
 @dataclass(frozen=True)
@@ -39,7 +27,6 @@ class RigTuning:
     quadrature_order: int = tuned(
         6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
     )
-    kept: int = tuned(8, "simulations", "of all runs that are kept", "memory, run time")
 
     # --- constants.py ---
     timing: float = tuned(5e-3, "s", "a channel's stamps may be off by so much", DESIGN)
@@ -90,9 +77,6 @@ class RigTuning:
 
     # --- proposals.py ---
     proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")
-    proposal_levels: Mapping[str, Levels] = tuned(
-        LEVELS, "choice", "what each experiment of the menu drives, one after the other"
-    )
 
     # --- signals.py ---
     longest: float = tuned(
@@ -127,7 +111,7 @@ class RigTuning:
     )
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
     doubt: float = tuned(
-        4.0, "σ", "of weights, a current at rest, or a line: beyond, they are others"
+        4.0, "σ", "of weights, a current at rest, a line, or a constant: beyond, they are others"
     )
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
     hold: float = tuned(1.0, "s", "weights and speeds are held for at least so long")

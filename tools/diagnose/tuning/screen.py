@@ -23,11 +23,6 @@ class ScreenTuning:
         "of a ripple at full rate by chance, from which it is an alarm by itself",
     )
     kinds: int = tuned(10, "kinds", "of misfit that count as independent, of all that are tried")
-    at_once: int = tuned(12, "signatures", "whitened and projected, or weighed, at once", "memory")
-
-    beyond: float = tuned(
-        4.0, "σ", "of a constant: farther from what is known of it is an alarm by itself"
-    )
 
     # --- ripples.py ---
     loudest: int = tuned(10, "orders", "whose physics is simulated", "run time")
@@ -36,14 +31,8 @@ class ScreenTuning:
     colour_sizes: tuple[float, ...] = tuned(
         COLOUR_SIZES, "-", "of the noise, beside what suits a channel for itself"
     )
-    colour_near: float = tuned(
-        10.0, "nats", "a colour so far behind the best for a channel alone is not tried in it"
-    )
-    colour_sweeps: int = tuned(2, "sweeps", "over the channels")
 
     # --- covered.py ---
-    coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
-    coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
     reference_open: float = tuned(
         0.3, "share", "of the discrepancy's variance that the reference may leave open"
     )
@@ -53,7 +42,6 @@ class ScreenTuning:
     step_width: float = tuned(
         0.015, "-", "of the whole stretch: a wheel is on both sides of a step for a while"
     )
-    frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")
 
     @property
     def sure(self) -> float:

@@ -34,8 +34,3 @@ class SearchTuning:
         0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
     )
     predicted_less: float = tuned(6.0, "nats", "less than that share", "run time")
-    least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
-    least_start: float = tuned(
-        0.02, "expected sizes", "of a strength that has a sign: at its bound it has no slope"
-    )
-    farthest_start: float = tuned(20.0, "expected sizes", "of any parameter")

@@ -101,7 +101,7 @@ class _Bend:
 def _rounds(shown: bool, start: float) -> int:
     bend = _Bend(shown)
     reached, converged = descend(bend, bend.linearised(np.array([start**2, start])), 300)
-    assert converged and reached.nats < TUNING.fit.gain
+    assert converged and reached.nats < TUNING.numerics.gain
     return bend.steps
 
 
@@ -116,7 +116,7 @@ def test_in_a_narrow_valley_a_converged_descent_is_near_the_optimum(steep: float
     """Also one that does not know what is curved: every step along the valley leaves it."""
     bend = _Bend(False, steep)
     reached, converged = descend(bend, bend.linearised(np.array([9.0, 3.0])), 300)
-    assert reached.nats < (TUNING.fit.gain if converged else 0.5)
+    assert reached.nats < (TUNING.numerics.gain if converged else 0.5)
 
 
 @pytest.mark.parametrize("shape", [1.5, 1.9, 2.0])
@@ -127,7 +127,7 @@ def test_a_gain_that_damping_hides_is_taken(shape: float) -> None:
     assert start.nats > 0.1
     reached, converged = descend(bend, start, 300)
     assert converged
-    assert reached.nats < TUNING.fit.gain
+    assert reached.nats < TUNING.numerics.gain
 
 
 class _Hidden:

@@ -91,7 +91,7 @@ def test_the_evidence_counts_no_more_than_the_fit_reached(rounds: int) -> None:
     forms = form_terms(base.problem.stack, base.problem.noise)
     sizes = tuple(0 for _ in forms)
 
-    with replaced("fit", rounds=rounds, size_rounds=1):
+    with replaced("numerics", rounds=rounds, size_rounds=1):
         model = fit_model(base.problem, forms, (PEAK,), free, begins, sizes)
     assert model.marginal is not None
     promised = model.marginal.gain(model.chosen)

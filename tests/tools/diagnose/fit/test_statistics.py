@@ -74,7 +74,7 @@ def test_the_banded_whitener_holds_all_that_is_not_negligible(colour: Colour) ->
     gaps = GAPS.copy()
     gaps[200], gaps[300] = 1.5, np.inf
     whole = whiten_unit(np.eye(gaps.size), gaps, [colour])[0][0]
-    whole[np.abs(whole) < TUNING.noise.negligible] = 0.0
+    whole[np.abs(whole) < TUNING.numerics.negligible] = 0.0
     np.testing.assert_array_equal(unit_whitener(gaps, colour).toarray(), whole)
 
 
@@ -123,7 +123,7 @@ def test_products_of_innovations_are_the_same_however_many_are_in_memory() -> No
     columns = np.random.default_rng(3).standard_normal((GAPS.size, 4))
     tried = [Colour(1.0, 2.0, 0.5, 0.3), Colour(1.0, 0.5, 0.0)]
     whitened, log_det = whiten_unit(columns, GAPS, tried)
-    with replaced("noise", whitened_at_once=8 * 17):
+    with replaced("numerics", whitened_at_once=8 * 17):
         gram, same = products_of_innovations(columns, GAPS, tried)
     np.testing.assert_allclose(gram, whitened.transpose(0, 2, 1) @ whitened, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(same, log_det)

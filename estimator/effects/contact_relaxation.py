@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.history import followed
+from gritd.estimator.stages.history import followed, run_by_run
 from gritd.estimator.stages.situation import Balanced, Complete, OnSoil, Reaction, Recall
-from gritd.estimator.terramechanics.soil import Scalar
+from gritd.estimator.terramechanics.soil import Array, Scalar
 
 ARC = 1.0  # [rad] of a usual contact
+USUAL, SHALLOW = 0.5, 0.05  # sin θ₁ at which Λ = λ, and the least that is told from none
+DRIVEN = 0.9  # |direction| of travel, below which the wheel is at rest or turns round
 
 
 @dataclass(frozen=True)
@@ -19,16 +21,19 @@ class ContactRelaxation(Effect):
     """Forces and sinkage follow a change of slip or load over a length of travel, because the wheel
     has to move on to new soil first.
 
-    y = y∞ + a (ȳ − y∞),   λ dȳ/ds = y∞ − ȳ,   ds = p r |dψ| + (1 − p) |dx|;   q λ for the sinkage
+    y = y∞ + a (ȳ − y∞),   Λ dȳ/ds = y∞ − ȳ,   Λ = λ (1 − g + 2 g sin θ₁);   q Λ for the sinkage
+    ds = p r |dψ| + (1 − p) |dx|
 
-    y∞ is T, DP or z at the slip and load of the moment, the run's first value where it begins: a
-    wheel that starts from rest builds its torque up. At rest z stays where it is; in the air
-    nothing lags. On line the forces are those of a slip and a load that lag in the same way.
+    y∞ is T, DP or z at the slip and load of the moment, the run's first value where it begins. At
+    rest z stays where it is; in the air nothing lags. On line the forces are those of a slip and a
+    load that lag in the same way.
     Source: first-order relaxation of a rolling contact, Pacejka (2012), Tire and Vehicle Dynamics,
-    3rd ed., chapter 7; the soil under the rim is renewed over the contact length r sin θ₁. Two
-    things were chosen here. The path may be the rim's, which shears the soil, or the axle's, which
-    brings new soil under it. The sinkage has a length of its own: the rim shears new soil after one
-    contact, and a rut is dug over more.
+    3rd ed., chapter 7. Four things were chosen here. The path may be the rim's, which shears the
+    soil, or the axle's, which brings new soil under it. The sinkage has a length of its own: the
+    rim shears new soil after one contact, and a rut is dug over more. The soil under the rim is
+    renewed over the contact length r sin θ₁: λ is that of θ₁ = 30°. Where the wheel stops or turns
+    round, soil that is sheared elastically starts from nought, and soil that was heaped and packed
+    keeps the size that the forces had: of a share m of the forces it is the size that follows.
     """
 
     forces: float = strength(
@@ -43,6 +48,17 @@ class ContactRelaxation(Effect):
     )
     rim: float = shape(
         "share of the rim's way in the path, p", "", mean=0.5, sigma=0.19, low=0.0, high=1.0
+    )
+    longer: float = shape(
+        "share of λ that goes with the contact, g", "", mean=0.5, sigma=0.3, low=0.0, high=1.0
+    )
+    kept: float = shape(
+        "share of T and DP that keeps its size through rest and reversal, m",
+        "",
+        mean=0.5,
+        sigma=0.3,
+        low=0.0,
+        high=1.0,
     )
 
     stage = "wheel"
@@ -62,13 +78,11 @@ class ContactRelaxation(Effect):
         return None
 
     def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
-        # at rest the soil's forces fade out, and with them what they lag
-        forces = self.forces * np.abs(situation.direction)
         return replace(
             reaction,
-            torque=reaction.torque + forces * self._behind(situation.torque, situation, 1.0),
+            torque=reaction.torque + self._forces_behind(situation.torque, situation),
             drawbar_pull=reaction.drawbar_pull
-            + forces * self._behind(situation.drawbar_pull, situation, 1.0),
+            + self._forces_behind(situation.drawbar_pull, situation),
             sinkage=reaction.sinkage
             + self.sinkage * self._behind(situation.sinkage, situation, self.deeper),
         )
@@ -92,21 +106,44 @@ class ContactRelaxation(Effect):
         moved = self._path(rim, np.abs(situation.carriage_speed)) * step
         if not memory or situation.carried <= 0.0:
             return now
-        share = float(-np.expm1(-moved / self.length))
+        share = float(-np.expm1(-moved / self._length(situation)))
         return tuple(m + share * (n - m) for m, n in zip(memory, now, strict=True))
 
     def _path(self, rim: Scalar, axle: Scalar) -> Scalar:
         """ds of the ways of rim and axle."""
         return self.rim * rim + (1.0 - self.rim) * axle
 
+    def _length(self, situation: Balanced) -> Scalar:
+        """Λ [m]."""
+        shallow = np.maximum(np.sin(situation.theta_1), SHALLOW)
+        return self.length * (1.0 - self.longer + self.longer * shallow / USUAL)
+
+    def _forces_behind(self, steady: Scalar, situation: Balanced) -> Scalar:
+        """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too."""
+        way = np.asarray(situation.direction)
+        size = run_by_run(_size, situation.run, steady, way) if np.ndim(steady) else steady
+        signed = np.abs(way) * self._behind(steady, situation, 1.0)
+        sized = way * self._behind(size, situation, 1.0)
+        return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
+
     def _behind(self, steady: Scalar, situation: Balanced, times: float) -> Scalar:
-        """ȳ − y∞ over so many λ."""
+        """ȳ − y∞ over so many Λ."""
         if np.ndim(steady) == 0:
             return 0.0
         rim = situation.radius * _steps(situation.wheel_angle)
         moved = self._path(rim, _steps(situation.position))
-        share = np.where(situation.carried > 0.0, -np.expm1(-moved / (times * self.length)), 1.0)
-        return followed(steady, share, situation.run) - steady
+        share = -np.expm1(-moved / (times * self._length(situation)))
+        touching = np.where(situation.carried > 0.0, share, 1.0)
+        return followed(steady, touching, situation.run) - steady
+
+
+def _size(force: Array, way: Array) -> Array:
+    """A force (n,) in the direction of travel, through a rest that of the latest travel."""
+    driven = np.flatnonzero(np.abs(way) > DRIVEN)
+    if not driven.size:
+        return np.zeros(force.size)
+    latest = driven[np.maximum(np.searchsorted(driven, np.arange(force.size), "right") - 1, 0)]
+    return np.asarray(force[latest] / way[latest])
 
 
 def _mobilising(situation: OnSoil) -> Scalar:

@@ -21,6 +21,8 @@ from gritd.tools.diagnose.rig.campaign import Campaign
 from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, typical
 
 RATE = 50.0  # [Hz]
+# of one length, and from nought where the wheel stops or turns round
+LAGS = {"forces": 1.0, "sinkage": 1.0, "longer": 0.0, "kept": 0.0}
 ALONE = [n for n, e in EFFECTS.items() if not e.filter_only and not e.by_run]
 
 
@@ -55,7 +57,7 @@ def test_a_step_is_followed_over_the_relaxation_length_at_any_speed(
 ) -> None:
     motion = driven(stepped(40.0, 90.0), stepped(0.1, 0.5), np.full(1000, speed))
     plain = getattr(simulate_arrays(WHEEL, SOIL, motion), channel)
-    lagging = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.03})
+    lagging = make("contact_relaxation", {**LAGS, "length": 0.03})
     found = getattr(simulate_arrays(WHEEL, SOIL, motion, (lagging,)), channel)
 
     np.testing.assert_allclose(found[:250], plain[:250], rtol=1e-12)
@@ -71,7 +73,7 @@ def test_sinkage_has_a_length_of_its_own_and_the_path_is_that_of_rim_or_axle(
     motion = driven(stepped(60.0, 60.0), stepped(0.1, 0.6), np.full(1000, 0.2))
     plain = getattr(simulate_arrays(WHEEL, SOIL, motion), channel)
     shapes = {"length": 0.03, "deeper": 1.8, "rim": rim}
-    lagging = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, **shapes})
+    lagging = make("contact_relaxation", {**LAGS, **shapes})
     found = getattr(simulate_arrays(WHEEL, SOIL, motion, (lagging,)), channel)
 
     way = path(motion, rim) / (0.03 * times)
@@ -92,11 +94,13 @@ def test_a_wheel_at_rest_keeps_its_sinkage_and_feels_no_torque() -> None:
     np.testing.assert_allclose(found.torque[251:], 0.0, atol=1e-9)
 
 
-def test_a_wheel_that_touches_down_begins_anew() -> None:
+@pytest.mark.parametrize("kept", [0.0, 1.0])
+def test_a_wheel_that_touches_down_begins_anew(kept: float) -> None:
     """Off the ground nothing is remembered of what was before."""
     load = np.concatenate((np.full(300, 80.0), np.zeros(100), np.full(600, 30.0)))
     motion = driven(load, np.full(1000, 0.3), np.full(1000, 0.3))
-    found = simulate_arrays(WHEEL, SOIL, motion, (typical(EFFECTS["contact_relaxation"]),))
+    lagging = make("contact_relaxation", {**LAGS, "kept": kept})
+    found = simulate_arrays(WHEEL, SOIL, motion, (lagging,))
     plain = simulate_arrays(WHEEL, SOIL, motion)
     np.testing.assert_array_equal(found.torque[300:400], 0.0)
     assert np.all(np.diff(found.torque[400:]) > -1e-12)
@@ -104,13 +108,43 @@ def test_a_wheel_that_touches_down_begins_anew() -> None:
     assert found.torque[-1] == pytest.approx(plain.torque[-1], rel=1e-3)
 
 
-def test_a_run_that_starts_from_rest_builds_its_torque_up() -> None:
+@pytest.mark.parametrize(("kept", "shares"), [(0.0, [0.1, 0.63, 0.99]), (1.0, [1.0, 1.0, 1.0])])
+def test_a_run_that_starts_from_rest_builds_its_torque_up_or_has_kept_it(
+    kept: float, shares: list[float]
+) -> None:
     speed = stepped(0.0, 0.3)
     motion = driven(np.full(1000, 60.0), np.full(1000, 0.3), speed)
-    found = simulate_arrays(WHEEL, SOIL, motion, (typical(EFFECTS["contact_relaxation"]),))
+    lagging = make("contact_relaxation", {**LAGS, "kept": kept})
+    found = simulate_arrays(WHEEL, SOIL, motion, (lagging,))
     steady = simulate_arrays(WHEEL, SOIL, motion).torque[-1]
     after = found.torque[250 + np.searchsorted(path(motion)[250:], [0.003, 0.03, 0.15])]
-    np.testing.assert_allclose(after / steady, [0.1, 0.63, 0.99], atol=0.02)
+    np.testing.assert_allclose(after / steady, shares, atol=0.02)
+
+
+def test_a_torque_that_keeps_its_size_turns_round_with_the_wheel() -> None:
+    speed = stepped(0.3, -0.3)
+    motion = driven(np.full(1000, 60.0), np.full(1000, 0.3), speed)
+    plain = simulate_arrays(WHEEL, SOIL, motion).torque
+    lagging = [make("contact_relaxation", {**LAGS, "kept": kept}) for kept in (0.0, 0.5, 1.0)]
+    signed, half, sized = (simulate_arrays(WHEEL, SOIL, motion, (one,)).torque for one in lagging)
+    np.testing.assert_allclose(sized, plain, rtol=1e-9)
+    assert signed[255] > 0.0 > plain[255]
+    np.testing.assert_allclose(half, 0.5 * (signed + sized), atol=1e-9)
+
+
+def test_the_length_goes_with_the_contact() -> None:
+    ways = {}
+    for load in (30.0, 120.0):
+        motion = driven(np.full(1000, load), stepped(0.1, 0.5), np.full(1000, 0.2))
+        plain = simulate_arrays(WHEEL, SOIL, motion)
+        lagging = make("contact_relaxation", {**LAGS, "sinkage": 0.0, "longer": 1.0})
+        found = simulate_arrays(WHEEL, SOIL, motion, (lagging,)).torque
+        left = (found[260] - plain.torque[-1]) / (plain.torque[0] - plain.torque[-1])
+        length = -(path(motion)[260] / np.log(left))
+        entry = np.arccos(1.0 - plain.sinkage[260] / WHEEL.radius)
+        ways[load] = length / np.sin(entry)
+    assert ways[30.0] == pytest.approx(0.03 / 0.5, rel=1e-6)
+    assert ways[120.0] == pytest.approx(ways[30.0], rel=1e-6)
 
 
 def test_running_in_starts_shallow_with_more_torque() -> None:

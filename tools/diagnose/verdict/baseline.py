@@ -33,7 +33,6 @@ from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
-from gritd.tools.diagnose.verdict.resemblance import likely
 
 PASSING = {*BEYOND_FORM, TURNING}
 
@@ -52,22 +51,23 @@ def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ..
 
 
 def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[ConfiguredEffect, ...]:
-    """What the reference is likeliest to show, where that is likelier to be there than to be
-    resembled, if both campaigns are likelier with it; as fitted to both. of_reference: None where
+    """The lasting effects by which the reference is likeliest explained, whether they are there or
+    resembled, if both campaigns are likelier with them; as fitted to both. of_reference: None where
     there is none.
     """
     named = [w for w in of_reference.weighed if w.names] if of_reference else []
     likeliest = max(named, key=lambda w: w.probability, default=None)
-    if likeliest is None or not all(likely(trust) for trust in likeliest.trusts.values()):
+    names = _not_had(base, likeliest.names) if likeliest is not None else []
+    if likeliest is None or not names:
         return ()
-    found = _in_both(base, likeliest.model, likeliest.names)
-    without = _in_both(base, base.model, ()) if found else None
+    without = _in_both(base, base.model, (), ())
+    found = _in_both(base, likeliest.model, names, names)
     if found is None or without is None:
         return ()
-    gain, count = np.array([found.evidence - without.evidence]), np.array([len(likeliest.names)])
+    gain, count = np.array([found.evidence - without.evidence]), np.array([len(names)])
     by = learnt(len(base.problem.stack.rig.effects), referred=True)
     likelier = by.weights(gain, count, np.zeros(1))[0] > 0.0
-    return _configured(found, likeliest.names) if likelier else ()
+    return _configured(found, names) if likelier else ()
 
 
 def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...]:
@@ -76,22 +76,29 @@ def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...
     """
     if not base.problem.stack.referred:
         return ()
-    tried = [(_in_both(base, accepted, (name,)), name) for name in accepted.names]
+    tried = [
+        (_in_both(base, accepted, accepted.names, (name,)), name)
+        for name in _not_had(base, accepted.names)
+    ]
     found = [(model, name) for model, name in tried if model is not None]
     best, name = max(found, key=lambda one: one[0].evidence, default=(accepted, ""))
     return _configured(best, (name,)) if name and best.evidence >= accepted.evidence else ()
 
 
-def _in_both(base: BaseFit, of: Model, names: Sequence[str]) -> Model | None:
-    """A model's effects fitted, those of some names in both campaigns; None where one of these does
-    not last, or both have it already.
-    """
-    rig, fitted = base.problem.stack.rig, of.fitted
+def _not_had(base: BaseFit, names: Sequence[str]) -> list[str]:
+    """Those that last, and that both campaigns do not have already."""
+    rig = base.problem.stack.rig
     had = {constant.parameter[0] for constant in rig.constants if constant.kind == HAD}
-    if not all(_lasts(rig.effects[name]) and name not in had for name in names):
-        return None
-    problem, begins = base.problem.in_both(names), (base.fitted.u, fitted.x)
-    effects, free, sizes = fitted.effects, fitted.free, base.model.sizes
+    return [name for name in names if _lasts(rig.effects[name]) and name not in had]
+
+
+def _in_both(base: BaseFit, of: Model, acting: Sequence[str], both: Sequence[str]) -> Model | None:
+    """Some effects of a model fitted, of these some in both campaigns."""
+    problem = base.problem.in_both(both)
+    effects = tuple(e for e, n in zip(of.fitted.effects, of.names, strict=True) if n in acting)
+    kept = np.array([free.name in acting for free in of.fitted.free], bool)
+    free = tuple(f for f, keep in zip(of.fitted.free, kept, strict=True) if keep)
+    begins, sizes = (base.fitted.u, of.fitted.x[kept]), base.model.sizes
     return attempted(lambda: fit_model(problem, base.forms, effects, free, begins, sizes))
 
 

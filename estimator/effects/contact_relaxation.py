@@ -50,13 +50,13 @@ class ContactRelaxation(Effect):
         "share of the rim's way in the path, p", "", mean=0.5, sigma=0.19, low=0.0, high=1.0
     )
     longer: float = shape(
-        "share of λ that goes with the contact, g", "", mean=0.5, sigma=0.3, low=0.0, high=1.0
+        "share of λ that goes with the contact, g", "", mean=0.5, sigma=0.19, low=0.0, high=1.0
     )
     kept: float = shape(
         "share of T and DP that keeps its size through rest and reversal, m",
         "",
         mean=0.5,
-        sigma=0.3,
+        sigma=0.19,
         low=0.0,
         high=1.0,
     )
@@ -83,8 +83,7 @@ class ContactRelaxation(Effect):
             torque=reaction.torque + self._forces_behind(situation.torque, situation),
             drawbar_pull=reaction.drawbar_pull
             + self._forces_behind(situation.drawbar_pull, situation),
-            sinkage=reaction.sinkage
-            + self.sinkage * self._behind(situation.sinkage, situation, self.deeper),
+            sinkage=reaction.sinkage + self._sinkage_behind(situation),
         )
 
     def answered(self, slip: Scalar, load: Scalar, situation: Complete) -> tuple[Scalar, Scalar]:
@@ -120,21 +119,29 @@ class ContactRelaxation(Effect):
 
     def _forces_behind(self, steady: Scalar, situation: Balanced) -> Scalar:
         """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too."""
-        way = np.asarray(situation.direction)
-        size = run_by_run(_size, situation.run, steady, way) if np.ndim(steady) else steady
-        signed = np.abs(way) * self._behind(steady, situation, 1.0)
-        sized = way * self._behind(size, situation, 1.0)
-        return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
-
-    def _behind(self, steady: Scalar, situation: Balanced, times: float) -> Scalar:
-        """ȳ − y∞ over so many Λ."""
         if np.ndim(steady) == 0:
             return 0.0
+        way = np.asarray(situation.direction)
+        passed = self._passed(situation, 1.0)
+        signed = np.abs(way) * (followed(steady, passed, situation.run) - steady)
+        size = run_by_run(_size, situation.run, steady, way)
+        kept = followed(run_by_run(_begun, situation.run, size, passed), passed, situation.run)
+        sized = way * (kept - size)
+        return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
+
+    def _sinkage_behind(self, situation: Balanced) -> Scalar:
+        steady = situation.sinkage
+        if np.ndim(steady) == 0:
+            return 0.0
+        passed = self._passed(situation, self.deeper)
+        return self.sinkage * (followed(steady, passed, situation.run) - steady)
+
+    def _passed(self, situation: Balanced, times: float) -> Array:
+        """Share (n,) of the way to y∞ that ȳ goes from one sample to the next, over so many Λ."""
         rim = situation.radius * _steps(situation.wheel_angle)
         moved = self._path(rim, _steps(situation.position))
         share = -np.expm1(-moved / (times * self._length(situation)))
-        touching = np.where(situation.carried > 0.0, share, 1.0)
-        return followed(steady, touching, situation.run) - steady
+        return np.where(situation.carried > 0.0, share, 1.0)
 
 
 def _size(force: Array, way: Array) -> Array:
@@ -144,6 +151,14 @@ def _size(force: Array, way: Array) -> Array:
         return np.zeros(force.size)
     latest = driven[np.maximum(np.searchsorted(driven, np.arange(force.size), "right") - 1, 0)]
     return np.asarray(force[latest] / way[latest])
+
+
+def _begun(size: Array, passed: Array) -> Array:
+    """The same (n,), the first as if the way that a run begins with had been driven before it: at
+    the moment a wheel starts its slip is hardly known.
+    """
+    behind = followed(size[::-1], np.append(1.0, passed[:0:-1]))
+    return np.append(behind[-1], size[1:])
 
 
 def _mobilising(situation: OnSoil) -> Scalar:

@@ -56,7 +56,7 @@ def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[Config
     there is none.
     """
     named = [w for w in of_reference.weighed if w.names] if of_reference else []
-    likeliest = max(named, key=lambda w: w.probability, default=None)
+    likeliest = max(named, key=lambda w: w.evidence, default=None)
     names = _not_had(base, likeliest.names) if likeliest is not None else []
     if likeliest is None or not names:
         return ()

@@ -13,6 +13,7 @@ from gritd.estimator.terramechanics.soil import Array, Scalar
 
 ARC = 1.0  # [rad] of a usual contact
 USUAL, SHALLOW = 0.5, 0.05  # sin θ₁ at which Λ = λ, and the least that is told from none
+SLIP_KNOWN = 2e-3  # [m] of travel that tells a slip
 DRIVEN = 0.9  # |direction| of travel, below which the wheel is at rest or turns round
 
 
@@ -121,27 +122,26 @@ class ContactRelaxation(Effect):
         """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too."""
         if np.ndim(steady) == 0:
             return 0.0
-        way = np.asarray(situation.direction)
-        passed = self._passed(situation, 1.0)
-        signed = np.abs(way) * (followed(steady, passed, situation.run) - steady)
-        size = run_by_run(_size, situation.run, steady, way)
-        kept = followed(run_by_run(_begun, situation.run, size, passed), passed, situation.run)
-        sized = way * (kept - size)
+        run, way = situation.run, np.asarray(situation.direction)
+        share = self._shares(situation, self._length(situation))
+        signed = np.abs(way) * (followed(steady, share, run) - steady)
+        size = run_by_run(_size, run, steady, way)
+        begun = run_by_run(_begun, run, size, self._shares(situation, SLIP_KNOWN))
+        sized = way * (followed(begun, share, run) - size)
         return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
 
     def _sinkage_behind(self, situation: Balanced) -> Scalar:
         steady = situation.sinkage
         if np.ndim(steady) == 0:
             return 0.0
-        passed = self._passed(situation, self.deeper)
-        return self.sinkage * (followed(steady, passed, situation.run) - steady)
+        share = self._shares(situation, self.deeper * self._length(situation))
+        return self.sinkage * (followed(steady, share, situation.run) - steady)
 
-    def _passed(self, situation: Balanced, times: float) -> Array:
-        """Share (n,) of the way to y∞ that ȳ goes from one sample to the next, over so many Λ."""
+    def _shares(self, situation: Balanced, length: Scalar) -> Array:
+        """Of the way to y∞ that ȳ goes from one sample to the next over a length [m] (n,)."""
         rim = situation.radius * _steps(situation.wheel_angle)
         moved = self._path(rim, _steps(situation.position))
-        share = -np.expm1(-moved / (times * self._length(situation)))
-        return np.where(situation.carried > 0.0, share, 1.0)
+        return np.where(situation.carried > 0.0, -np.expm1(-moved / length), 1.0)
 
 
 def _size(force: Array, way: Array) -> Array:
@@ -153,12 +153,12 @@ def _size(force: Array, way: Array) -> Array:
     return np.asarray(force[latest] / way[latest])
 
 
-def _begun(size: Array, passed: Array) -> Array:
-    """The same (n,), the first as if the way that a run begins with had been driven before it: at
-    the moment a wheel starts its slip is hardly known.
+def _begun(size: Array, share: Array) -> Array:
+    """The same (n,), the first a mean over the way that the run begins with: at the moment a wheel
+    starts its slip is not known.
     """
-    behind = followed(size[::-1], np.append(1.0, passed[:0:-1]))
-    return np.append(behind[-1], size[1:])
+    before = followed(size[::-1], np.append(1.0, share[:0:-1]))
+    return np.append(before[-1], size[1:])
 
 
 def _mobilising(situation: OnSoil) -> Scalar:

@@ -31,7 +31,7 @@ def form_terms(stack: Stack, noise: Noise) -> tuple[RandomEffect, ...]:
     for source in stack.rig.forms:
         columns = _columns(stack, source)
         if columns.shape[1]:
-            sizes = _drive_sizes() if source.drive else _form_sizes()
+            sizes = _drive_sizes() if source.drive else form_sizes()
             terms.append(
                 random_effect(source.name, columns, noise, sizes, of_form=not source.drive)
             )
@@ -72,7 +72,8 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(acting**2))) if acting.size else 0.0
 
 
-def _form_sizes() -> Sizes:
+def form_sizes() -> Sizes:
+    """Shares of a channel that published models miss."""
     return Sizes(TUNING.fit.form_sizes, TUNING.fit.form_prior)
 
 
@@ -117,8 +118,14 @@ def _smooth(stack: Stack, source: FormSource) -> Array:
         for k in TUNING.fit.form_harmonics
         for wave in (np.cos, np.sin)
     ]
-    size = _size(stack, source, acting) if source.size is None else source.size
-    return np.column_stack((smooth, *turning)) * weight[:, None] * size
+    return np.column_stack((smooth, *turning)) * scale_of(stack, source)[:, None]
+
+
+def scale_of(stack: Stack, source: FormSource) -> Array:
+    """The size of a source's channels (N,) in proportion to the load, in their units."""
+    weight = _weight(stack, source)
+    size = _size(stack, source, weight != 0.0) if source.size is None else source.size
+    return np.asarray(weight * size)
 
 
 _formed: WeakKeyDictionary[Stack, dict[str, Array]] = WeakKeyDictionary()

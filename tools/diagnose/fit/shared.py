@@ -11,7 +11,8 @@ linear about the rough fit, reduced to the directions that the recordings can sh
 soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
 says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
 keeps its order and its size, but not its phase: each run has its own. A run of larger forces or
-torques may ripple more in proportion, as a gear does.
+torques may ripple more in proportion, as a gear does. What a run begins with, before soil is
+sheared and heaped under a wheel that was set down, is another in each run too.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from dataclasses import replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, order_of
+from gritd.estimator.model.discrepancy import CONDITIONS, START
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, scale_of
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
@@ -35,6 +38,7 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 CHANGES = "changes"  # what varies with time, heat, place or run
+STARTS = "starts"  # what a run begins with
 # what all other effects are of, and their stages
 PARTS = {
     CHANGES: (),
@@ -54,7 +58,20 @@ def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]
         every = list(raw_signatures(stack, u, predicted, [name], everywhere=True))
         own = columns[_part_of(stack.rig.effects[name])]
         own += [s.columns / np.sqrt(len(every)) for s in every]
-    return {part: np.column_stack(each) for part, each in columns.items()}
+    return {part: np.column_stack(each) for part, each in columns.items()} | {
+        STARTS: _starts(stack)
+    }
+
+
+def _starts(stack: Stack) -> Array:
+    """What each run begins with (N, s), in proportion to its forces, of every run its own."""
+    columns = [np.zeros((stack.size, 0))]
+    runs = stack.run[:, None] == np.arange(len(stack.rig.runs))
+    for source in stack.rig.forms:
+        if not source.drive:
+            left = START * conditions_at(stack, source)[:, CONDITIONS.index("start")]
+            columns.append(np.where(runs, (left * scale_of(stack, source))[:, None], 0.0))
+    return np.column_stack(columns)
 
 
 def _part_of(effect: type[Effect]) -> str:
@@ -115,9 +132,9 @@ def shared_terms(
     noise: Noise, shared: Mapping[str, Array], ripples: Array
 ) -> tuple[RandomEffect, ...]:
     """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
-    sizes = even(TUNING.fit.shared_sizes)
+    sizes = {part: even(TUNING.fit.shared_sizes) for part in shared} | {STARTS: form_sizes()}
     terms = [
-        random_effect(_name(part), _reduced(columns, whiten(noise, columns)), noise, sizes)
+        random_effect(_name(part), _reduced(columns, whiten(noise, columns)), noise, sizes[part])
         for part, columns in shared.items()
     ]
     terms.append(random_effect("ripples in both", ripples, noise, Sizes()))
@@ -125,11 +142,12 @@ def shared_terms(
 
 
 def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
-    """The terms with what varies with time, heat, place or run no larger than its size in the
-    reference. Where nothing dried, warmed up or crept then, it is news if something does now.
+    """The terms with what varies with time, heat, place or run, and what runs begin with, no larger
+    than in the reference. Where nothing dried, warmed up or crept then, it is news if it does now.
     """
+    passing = (_name(CHANGES), _name(STARTS))
     return tuple(
-        replace(f, sizes=f.sizes.up_to(number)) if f.name == _name(CHANGES) else f
+        replace(f, sizes=f.sizes.up_to(number)) if f.name in passing else f
         for f, number in zip(terms, sizes, strict=True)
     )
 

@@ -12,9 +12,9 @@ where that explains both campaigns no worse than without it, or than what was ac
 does an accepted effect that explains them no worse in both: the reference shows it, and was only
 too short or too steady to tell it alone.
 
-An effect that goes with time, heat, place or run may be another one a day later, but for one that
-begins anew in every run, and a ripple has another phase in each run: those stay with the terms
-of fit/shared.py.
+An effect that goes with time, heat, place or run may be another one a day later, what a run begins
+with is another in each, and a ripple has another phase in each: those stay with the terms of
+fit/shared.py.
 """
 
 from __future__ import annotations
@@ -107,7 +107,11 @@ def _configured(model: Model, names: Sequence[str]) -> tuple[ConfiguredEffect, .
 
 
 def _lasts(effect: type[Effect]) -> bool:
-    return effect.every_run or effect.fingerprint.covariate not in PASSING
+    """Whether an effect of one campaign is the same in another; of those that begin anew in every
+    run what is of the drive, for a wheel is set down another way each time.
+    """
+    drives = effect.every_run and effect.stage == "drivetrain"
+    return drives or effect.fingerprint.covariate not in PASSING
 
 
 def _parameters(model: Model, name: str) -> Iterator[tuple[str, Uncertain]]:

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import search_models
+from gritd.tools.diagnose.search.search import begin, search_models
 from gritd.tools.diagnose.verdict.baseline import baseline_effects, shown_as_well, shown_unsurely
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
@@ -29,6 +29,7 @@ pytestmark = pytest.mark.long
 
 LAG = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.06})
 BEGINNING = make("running_in", {"pull": 0.3, "shallow": 0.3, "torque": 0.3, "length": 0.06})
+PULLS = (0.3, 0.1, 0.2)
 RIPPLE = make("gear_ripple", {"ripple_cos": 0.2, "order": 23.0})
 HAD = ConfiguredEffect(
     "contact_relaxation",
@@ -98,9 +99,19 @@ def test_a_lag_lasts_if_nothing_could_stand_in_its_place() -> None:
     assert baseline_effects(rig, unsure) == ()
 
 
-def test_what_begins_anew_in_every_run_lasts() -> None:
-    rig, decision = decided(BEGINNING)
-    assert [effect.name for effect in baseline_effects(rig, decision)] == ["running_in"]
+def test_a_heat_that_begins_anew_in_every_run_lasts() -> None:
+    rig, decision = decided(make("motor_heating", {"fall": 0.2}))
+    assert [effect.name for effect in baseline_effects(rig, decision)] == ["motor_heating"]
+
+
+def test_what_a_run_begins_with_is_another_in_each_and_no_news() -> None:
+    """A wheel that is set down otherwise each time."""
+    runs = []
+    for seed in (3, 4):
+        each = [record(plan(seed=seed), (replace(BEGINNING, pull=p, torque=p),)) for p in PULLS]
+        runs += [begun[number] for number, begun in enumerate(each)]
+    rig = wheel_rig(runs, settings(), 3, "same")
+    assert not begin(prepare_screening(fit_base(rig))).first.alarmed
 
 
 def test_what_goes_with_the_day_does_not() -> None:

@@ -3,8 +3,8 @@ simulated cases whose plants have other forms than the library's.
 
 The evidence of every explanation [nats] becomes a probability by one temperature, the odds of a
 listed effect, of one more effect and of what is in no list, and the share of cases in which all
-evidence misleads. A rig that has a reference is one that the equations do not quite follow, so what
-is new on it is distinguished by less: it has a table of its own.
+evidence misleads. They are the same beside a reference, as what the rig does anyway acts in both
+campaigns.
 """
 
 from __future__ import annotations
@@ -52,14 +52,9 @@ class OddsCalibration:
         return np.asarray((evidence - price) / self.temperature + odds)
 
 
-def table_of(referred: bool) -> str:
-    """The table for campaigns beside a reference, or for campaigns alone."""
-    return "pairs" if referred else "alone"
-
-
 @cache
-def learnt(candidates: int = 1, referred: bool = False) -> OddsCalibration:
-    """What calibration.json holds, for so many listed effects; referred: beside a reference."""
-    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))[table_of(referred)]
+def learnt(candidates: int = 1) -> OddsCalibration:
+    """What calibration.json holds, for so many listed effects."""
+    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))
     names = [n for n in OddsCalibration.__dataclass_fields__ if n != "candidates"]
     return OddsCalibration(**{name: float(table[name]) for name in names}, candidates=candidates)

@@ -63,8 +63,7 @@ class EffectSearch:
     @property
     def calibration(self) -> OddsCalibration:
         """How far evidence is to be trusted here."""
-        stack = self.problem.stack
-        return learnt(len(stack.rig.effects), stack.referred)
+        return learnt(len(self.problem.stack.rig.effects))
 
     def gain(self, model: Model) -> float:
         """Log evidence above the bare model's [nats]."""

@@ -65,7 +65,7 @@ def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[Config
     if found is None or without is None:
         return ()
     gain, count = np.array([found.evidence - without.evidence]), np.array([len(names)])
-    by = learnt(len(base.problem.stack.rig.effects), referred=True)
+    by = learnt(len(base.problem.stack.rig.effects))
     likelier = by.weights(gain, count, np.zeros(1))[0] > 0.0
     return _configured(found, names) if likelier else ()
 

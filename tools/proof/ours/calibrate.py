@@ -1,13 +1,12 @@
-"""`python -m gritd.tools.proof.ours.calibrate [--pairs] --out OUT PATH…`: learn how far evidence is
-to be trusted, of campaigns alone or of pairs.
+"""`python -m gritd.tools.proof.ours.calibrate --out OUT PATH…`: learn how far evidence is to be
+trusted.
 
 Each PATH is the folder of an opened batch of blind trials (`gritd prove --output PATH`). The
 temperature and the odds are those that give the truth of every case the largest probability, on
 average: the logarithmic score, which only stated probabilities that are true maximise (Good 1952).
 A prior (START, PRIOR) keeps what few cases do not tell. The truth of a case is any set of effects
 that holds a true one, weighted by how many of its effects are true; of one outside the list, or of
-a pair in which nothing is new, an explanation without names. OUT keeps the other table that it
-holds.
+a pair in which nothing is new, an explanation without names.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.guard import guarded
-from gritd.tools.diagnose.search.calibration import OddsCalibration, table_of
+from gritd.tools.diagnose.search.calibration import OddsCalibration
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
@@ -112,19 +111,19 @@ def learn(cases: Sequence[WeighedCase]) -> tuple[OddsCalibration, float]:
 # ---- where cases come from ---------------------------------------------------------------------
 
 
-def read(folder: Path, pairs: bool = False) -> list[WeighedCase]:
+def read(folder: Path) -> list[WeighedCase]:
     """The cases of an opened batch that alarmed: the others say nothing of names. A campaign alone
-    counts where it alarmed rightly. pairs: the pairs instead of the campaigns alone.
+    counts where it alarmed rightly.
     """
     cases = []
     for result in sorted(folder.glob("cases/*/result.json")):
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
-        wanted = bool(answers.get("bed")) == pairs and (pairs or answers["effects"])
-        if diagnosis["explanations"] and wanted:
+        pair = bool(answers.get("bed"))
+        if diagnosis["explanations"] and (pair or answers["effects"]):
             unlisted = not set(answers["effects"]) & EFFECTS.keys()
-            held = () if pairs else HELD[answers.get("world", PAPER)]
+            held = () if pair else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]
             cases.append(
                 case_of(diagnosis["explanations"], answers["effects"], unlisted, count, held)
@@ -133,23 +132,16 @@ def read(folder: Path, pairs: bool = False) -> list[WeighedCase]:
     return cases
 
 
-def _keep(out: Path, name: str, table: dict[str, Any]) -> None:
-    """A table beside the others of a file."""
-    kept = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {}
-    out.write_text(json.dumps(kept | {name: table}, indent=1) + "\n", encoding="utf-8")
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m gritd.tools.proof.ours.calibrate", description=__doc__
     )
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH")
-    parser.add_argument("--pairs", action="store_true", help="of folders, the pairs")
     parser.add_argument("--out", type=Path)
     parser.add_argument("--note", default="", help="how the cases were made; kept with the table")
     arguments = parser.parse_args(argv)
 
-    cases = [case for path in arguments.paths for case in read(path, arguments.pairs)]
+    cases = [case for path in arguments.paths for case in read(path)]
     if not cases:
         where = ", ".join(map(str, arguments.paths))
         raise CommandError(f"{where}: found no trial that raised an alarm; expected some")
@@ -158,7 +150,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table |= {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}
     print(json.dumps(table, indent=1))
     if arguments.out is not None:
-        _keep(arguments.out, table_of(arguments.pairs), table)
+        arguments.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

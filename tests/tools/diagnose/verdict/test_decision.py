@@ -211,24 +211,14 @@ def test_what_has_no_name_stands_beside_a_rival_too(names_alone: None) -> None:
     assert decide.judged(search, alone, {}, learnt(30)).best is one
 
 
-@pytest.mark.parametrize("referred", [False, True])
-def test_the_learnt_table_is_sound(referred: bool) -> None:
-    by = learnt(referred=referred)
+def test_the_learnt_table_is_sound() -> None:
+    by = learnt()
     assert 0.5 < by.temperature < 50.0
     assert max(by.more, by.nameless) < 3.0 and by.listed > -5.0
     assert 0.0 < by.lapse < 0.3
 
 
-def test_beside_a_reference_the_same_evidence_says_less() -> None:
-    """A rig with a reference is off the equations: names beside names come more easily there."""
-    alone, pairs = learnt(30), learnt(30, referred=True)
-    evidence, count, none = np.array([30.0, 40.0]), np.array([1, 2]), np.zeros(2)
-    less, more = (by.weights(evidence, count, none) @ [-1.0, 1.0] for by in (pairs, alone))
-    assert less < more
-
-
-def test_a_table_is_learnt_beside_the_other(tmp_path: Path) -> None:
-    """Campaigns alone and pairs of a batch each have their own."""
+def test_a_table_is_learnt_from_campaigns_alone_and_pairs(tmp_path: Path) -> None:
     for number, bed in enumerate([None, "same"]):
         case = tmp_path / "cases" / f"case-{number}"
         case.mkdir(parents=True)
@@ -239,19 +229,16 @@ def test_a_table_is_learnt_beside_the_other(tmp_path: Path) -> None:
         answers = {"effects": ["grousers"], "bed": bed}
         (tmp_path / "answers" / f"{case.name}.json").write_text(json.dumps({"answers": answers}))
 
-    assert [c.evidence.tolist() for c in read(tmp_path)] == [[9.0]]
-    assert [c.evidence.tolist() for c in read(tmp_path, pairs=True)] == [[10.0]]
+    assert [c.evidence.tolist() for c in read(tmp_path)] == [[9.0], [10.0]]
 
     out = tmp_path / "table.json"
     assert main([str(tmp_path), "--out", str(out)]) == 0
-    alone = json.loads(out.read_text())
-    assert main([str(tmp_path), "--pairs", "--out", str(out)]) == 0
-    both = json.loads(out.read_text())
-    assert both.keys() == {"alone", "pairs"} and both["alone"] == alone["alone"]
+    table = json.loads(out.read_text())
+    assert {"temperature", "listed", "more", "nameless", "lapse", "cases"} <= table.keys()
 
     with pytest.raises(CommandError, match="no trial that raised an alarm"):
         main([str(tmp_path / "answers"), "--out", str(out)])
-    assert json.loads(out.read_text()) == both
+    assert json.loads(out.read_text()) == table
 
 
 def test_the_evidence_of_a_fit_is_the_integral() -> None:

@@ -110,7 +110,10 @@ def accustomed(
         step(f"{OF_REFERENCE}{what}")
 
     said("fitting the soil and the noise")
-    _, decision = _decided(fit_base(alone, jobs), said, jobs)
+    base = fit_base(alone, jobs)
+    with replaced("verdict", companion=0.0):  # what it shows is not named, but had
+        search = search_models(prepare_screening(base), said, jobs)
+    decision = decide(search, jobs, said)
     return rig.having(baseline_effects(alone, decision)), decision
 
 

@@ -87,9 +87,20 @@ def test_every_listed_effect_but_ripples_may_act_in_both_in_one_part() -> None:
     stack, _ = _columns((), 7, seconds=20.0)
     u = np.zeros(len(stack.rig.constants))
     shared = shared_columns(stack, u, stack.predict(u))
-    assert list(shared) == ["changes", "drive", "soil", "instruments"]
+    assert list(shared) == ["changes", "drive", "soil", "instruments", "starts"]
     assert all(columns.shape[1] for columns in shared.values())
 
     drive, torque = np.abs(shared["drive"]), stack.of("torque")  # friction is in the motor's alone
     assert drive[~torque].max() < 1e-6 * drive[torque].max()
     assert np.any(shared["soil"][stack.of("drawbar_pull")])
+
+
+def test_what_a_run_begins_with_is_that_runs_alone_and_fades() -> None:
+    stack, _ = _columns((), 7, seconds=20.0)
+    u = np.zeros(len(stack.rig.constants))
+    starts = np.abs(shared_columns(stack, u, stack.predict(u))["starts"])
+    assert np.all([np.unique(stack.run[column > 0.0]).size == 1 for column in starts.T])
+    first = stack.of("drawbar_pull") & (stack.run == 0)
+    of_pull = starts[first].max(axis=1)
+    driven = of_pull[of_pull > 0.0]
+    assert driven[-1] < 0.1 * driven[0]

@@ -11,6 +11,7 @@ from gritd.estimator.stages.situation import Balanced, ContactLaw, Reaction, Sit
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 
 RIPPLE = ("ripple_cos", "ripple_sin", "lift_cos", "lift_sin", "count")
+SMOOTH_TOO = ("rise", "growth")  # of a smooth wheel: `sinkage_datum`, `slip_sinkage`
 
 
 @dataclass(frozen=True)
@@ -105,10 +106,12 @@ class Grousers(Effect):
 
 
 class GrousersInMeans(Grousers):
-    """The lugs of a wheel of which only steady means were measured: no ripple, so no count."""
+    """The lugs of a wheel of which only steady means were measured: no ripple, so no count, and
+    nothing that a smooth wheel has too.
+    """
 
     fingerprint = Fingerprint("drawbar_pull", "slip", "more pull; deeper at high slip")
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
-        return tuple(p for p in super().parameters() if p.name not in RIPPLE)
+        return tuple(p for p in super().parameters() if p.name not in RIPPLE + SMOOTH_TOO)

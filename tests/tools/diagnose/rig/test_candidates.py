@@ -87,7 +87,7 @@ def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals
 def test_lugs_dig_and_grip_in_a_table_without_a_count(driven: list[Signals]) -> None:
     rig = wheel_rig([tabled(run) for run in driven], settings())
     free = [f.parameter.name for f in free_of((rig.effects["grousers"],))]
-    assert free == ["height", "grip", "rise", "digging", "growth", "share"]
+    assert free == ["height", "grip", "digging", "share"]
     lugs = rig.effects["grousers"](digging=5e-3)
     without = rig.predict(np.zeros(len(rig.constants)), ())
     dug = rig.predict(np.zeros(len(rig.constants)), (lugs,))

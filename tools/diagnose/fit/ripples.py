@@ -51,8 +51,9 @@ def orders_shown(stack: Stack, lowest: float) -> Array:
     """Ripples a turn (o,) that the grid shows: whole numbers, and those that stand on it as they
     are at its times.
     """
-    least = max(lowest, np.ceil(resolved_order(stack.rig)))
-    whole = np.arange(least, min(highest_order(stack.rig), TUNING.fit.most_orders))
+    whole = np.arange(lowest, min(highest_order(stack.rig), TUNING.fit.most_orders))
+    if resolved_order(stack.rig) > 1.0:  # less than a turn
+        whole = whole[:0]
     lines = (x for channel in stack.rig.channels for x in restored(stack.rig, channel))
     more = [x.at for x in lines if x.at >= lowest]
     return np.unique(np.concatenate((whole, more)))

@@ -150,7 +150,7 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     if shown := rig.lines.orders(parameter.low, parameter.high):
         return shown
     top = min(parameter.high, highest_order(rig))
-    least = max(parameter.low, TUNING.fit.least_turns * resolved_order(rig))
+    least = max(parameter.low, TUNING.orders.cycles * resolved_order(rig))
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // TUNING.fit.most_orders))]]
 

@@ -205,7 +205,7 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     x = stack.covariate(axis)[own]
-    if x.size < 2 * TUNING.screen.step_values or np.ptp(x) <= SPAN:
+    if x.size < 2 * TUNING.noise.cell_values or np.ptp(x) <= SPAN:
         return np.zeros(0)
     if axis == "run":
         return np.arange(x.min(), x.max()) + 0.5
@@ -213,7 +213,7 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     ordered = np.sort(x)
     beyond = np.unique(
         np.linspace(
-            TUNING.screen.step_values, x.size - TUNING.screen.step_values, TUNING.screen.step_places
+            TUNING.noise.cell_values, x.size - TUNING.noise.cell_values, TUNING.screen.step_places
         ).astype(int)
     )
 

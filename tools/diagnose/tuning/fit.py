@@ -120,7 +120,6 @@ class FitTuning:
     )
 
     # --- signatures.py ---
-    least_turns: float = tuned(1.5, "ripples", "a run must hold to be distinguished from a trend")
     most_orders: int = tuned(120, "orders", "tried at most", "run time")
     derivative_steps: tuple[float, ...] = tuned(
         (1.0, 0.1, 0.01), "choice", "of an expected size, the next where the effect runs away"

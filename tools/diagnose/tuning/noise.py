@@ -74,7 +74,7 @@ class NoiseTuning:
     cell_widths: Mapping[str, float] = tuned(
         CELLS, "-", "of a cell of equal conditions; of speed and load relative to their largest"
     )
-    cell_values: int = tuned(10, "values", "a cell must hold")
+    cell_values: int = tuned(10, "values", "a cell must hold, and either side of a step")
     most_cells: int = tuned(60, "cells", "of a channel, or loads, at most")
     cell_phases: tuple[float, ...] = tuned(
         (0.5, 0.75, 0.0, 0.25), "choice", "of the edges of cells, in their widths"

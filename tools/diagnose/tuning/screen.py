@@ -38,7 +38,6 @@ class ScreenTuning:
     )
     # --- scans.py ---
     step_places: int = tuned(48, "places", "of a step along an axis", "run time")
-    step_values: int = tuned(8, "values", "on either side of a step")
     step_width: float = tuned(
         0.015, "-", "of the whole stretch: a wheel is on both sides of a step for a while"
     )

@@ -31,7 +31,7 @@ from gritd.tools.diagnose.noise.estimate import estimate
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import EffectSearch, search_models
+from gritd.tools.diagnose.search.search import search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.diagnose.verdict.baseline import (
     baseline_effects,
@@ -84,7 +84,9 @@ def _diagnose(
     base = fit_base(rig, jobs)
     known = shown_unsurely(base, of_reference)
     if not known:
-        search, decision = _decided(base, step, jobs)
+        give_back()
+        search = search_models(prepare_screening(base), step, jobs)
+        decision = decide(search, jobs, step)
         known = shown_as_well(base, decision.best)
     if known and rig.having:  # from the beginning: what is noise and what is usual is another
         return _diagnose(rig.having(known), of_reference, redo, step, jobs)
@@ -115,14 +117,6 @@ def accustomed(
         search = search_models(prepare_screening(base), said, jobs)
     decision = decide(search, jobs, said)
     return rig.having(baseline_effects(alone, decision)), decision
-
-
-def _decided(
-    base: BaseFit, step: Callable[[str], None], jobs: int
-) -> tuple[EffectSearch, Decision]:
-    give_back()
-    search = search_models(prepare_screening(base), step, jobs)
-    return search, decide(search, jobs, step)
 
 
 def fit_base(rig: Rig, jobs: int = 1) -> BaseFit:

@@ -7,10 +7,10 @@ line leaves of them becomes a large discrepancy of form, which hides what is new
 is first searched as any campaign is, and the effects found act in both campaigns, with parameters
 that both tell.
 
-What the reference is likeliest to show, but does not tell from others by itself, acts in both too
-where that explains both campaigns no worse than without it, or than what was accepted as new. So
-does an accepted effect that explains them no worse in both: the reference shows it, and was only
-too short or too steady to tell it alone.
+What explains the reference with the largest evidence, but is not told from others there or only
+resembles what is there, acts in both too where both campaigns are likelier with it. So does an
+effect accepted as new that explains them no worse in both: the reference shows it, and was only too
+short or too steady to tell it alone.
 
 An effect that goes with time, heat, place or run may be another one a day later, what a run begins
 with is another in each, and a ripple has another phase in each: those stay with the terms of
@@ -51,17 +51,17 @@ def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ..
 
 
 def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[ConfiguredEffect, ...]:
-    """The lasting effects by which the reference is likeliest explained, whether they are there or
-    resembled, if both campaigns are likelier with them; as fitted to both. of_reference: None where
-    there is none.
+    """The lasting effects of the explanation of a reference with the largest evidence, whether they
+    are there or resembled, if both campaigns are likelier with them; as fitted to both.
+    of_reference: None where there is none.
     """
     named = [w for w in of_reference.weighed if w.names] if of_reference else []
-    likeliest = max(named, key=lambda w: w.evidence, default=None)
-    names = _not_had(base, likeliest.names) if likeliest is not None else []
-    if likeliest is None or not names:
+    largest = max(named, key=lambda w: w.evidence, default=None)
+    names = _not_had(base, largest.names) if largest is not None else []
+    if largest is None or not names:
         return ()
     without = _in_both(base, base.model, (), ())
-    found = _in_both(base, likeliest.model, names, names)
+    found = _in_both(base, largest.model, names, names)
     if found is None or without is None:
         return ()
     gain, count = np.array([found.evidence - without.evidence]), np.array([len(names)])

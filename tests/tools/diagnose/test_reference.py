@@ -17,7 +17,7 @@ from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
-from gritd.tools.proof.ours.cases import record
+from gritd.tools.proof.ours.cases import record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
 
 pytestmark = pytest.mark.long
@@ -31,12 +31,10 @@ HABITS = (
 NEW = make("viscous_friction", {"damping": 0.8})
 
 
-def rig_of(habits: Sequence[Effect], new: Sequence[Effect]) -> Rig:
+def with_habits(new: Sequence[Effect]) -> Rig:
     """A reference campaign with habits, and one with something new beside them."""
-    before = record(plan(seed=3, seconds=24.0, wrench=False), habits)
-    after = record(plan(seed=4, seconds=24.0, wrench=False), (*habits, *new))
-    moved = [replace(s, name=f"new-{s.name}") for s in after]
-    return wheel_rig([*before, *moved], settings(), len(before), "same")
+    before, after = (plan(seed=seed, seconds=24.0, wrench=False) for seed in (3, 4))
+    return rig_of(after, (*HABITS, *new), record_fully(before, HABITS), "same")
 
 
 def elsewhere(new: Sequence[Effect]) -> Rig:
@@ -48,7 +46,7 @@ def elsewhere(new: Sequence[Effect]) -> Rig:
 
 
 def judged(new: Sequence[Effect]) -> Diagnosis:
-    return diagnose(rig_of(HABITS, new))
+    return diagnose(with_habits(new))
 
 
 def test_what_both_campaigns_do_is_no_news() -> None:
@@ -66,7 +64,7 @@ def test_what_is_new_is_named_alone() -> None:
 
 def test_the_runs_of_the_reference_show_what_is_usual() -> None:
     """News must be more than each of them would raise if it were new."""
-    screen = begin(prepare_screening(fit_base(rig_of(HABITS, (NEW,))))).first
+    screen = begin(prepare_screening(fit_base(with_habits((NEW,))))).first
     assert screen.alarmed and screen.ratio > screen.threshold > screen.usual >= 0.0
     assert not replace(screen, usual=screen.ratio).alarmed
 

@@ -10,7 +10,7 @@ from gritd.tools.proof.blind.plant.concealed.friction import lugre
 from gritd.tools.proof.blind.plant.concealed.travel import relaxed, steps_of
 from gritd.tools.proof.blind.plant.contact import Rim
 from gritd.tools.proof.blind.plant.effect import PlantEffect
-from gritd.tools.proof.blind.plant.memory import lagged
+from gritd.tools.proof.blind.plant.memory import lagged, mean_before
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Scene
 
@@ -34,15 +34,23 @@ class BottomPeak(PlantEffect):
 class Relaxation(PlantEffect):
     """Torque and pull follow over the length of the contact, `strength` [m] at an entry angle of
     30° and more where the wheel is deeper; the sinkage over as much and more.
+
+    By two lags of half the length one after the other, or as means over twice the length.
     """
 
     deeper: float = 1.5  # length of the sinkage over that of the forces
+    even: bool = False  # means
 
     def forces(self, scene: Scene) -> Scene:
         way = steps_of(scene) * USUAL / np.sin(np.clip(scene.theta_1, SHALLOW, DEEP))
-        late = relaxed(scene, lambda values: lagged(values, way, self.strength))
-        slow = relaxed(scene, lambda values: lagged(values, way, self.strength * self.deeper))
+        late = relaxed(scene, lambda values: self._late(values, way, self.strength))
+        slow = relaxed(scene, lambda values: self._late(values, way, self.strength * self.deeper))
         return replace(late, sinkage=slow.sinkage)
+
+    def _late(self, values: Array, way: Array, length: float) -> Array:
+        if self.even:
+            return mean_before(values, np.cumsum(way), 2.0 * length)
+        return lagged(lagged(values, way, 0.5 * length), way, 0.5 * length)
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,8 @@ def _bottom(rng: np.random.Generator) -> PlantEffect:
 
 
 def _relaxation(rng: np.random.Generator, share: float) -> PlantEffect:
-    return Relaxation(share * float(rng.uniform(0.02, 0.05)), float(rng.uniform(1.0, 2.0)))
+    length, deeper = share * float(rng.uniform(0.02, 0.05)), float(rng.uniform(1.0, 2.0))
+    return Relaxation(length, deeper, bool(rng.integers(2)))
 
 
 def _gear(rng: np.random.Generator, size: Size, share: float) -> tuple[PlantEffect, ...]:

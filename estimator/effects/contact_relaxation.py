@@ -12,7 +12,7 @@ from gritd.estimator.stages.situation import Balanced, Complete, OnSoil, Reactio
 from gritd.estimator.terramechanics.soil import Array, Scalar
 
 ARC = 1.0  # [rad] of a usual contact
-USUAL, SHALLOW = 0.5, 0.05  # sin θ₁ at which Λ = λ, and the least that is told from none
+USUAL, SHALLOW = 0.5, 0.05  # sin θ₁ at which Λ = λ, and the least that counts
 SLIP_KNOWN = 2e-3  # [m] of travel that tells a slip
 DRIVEN = 0.9  # |direction| of travel, below which the wheel is at rest or turns round
 

@@ -104,14 +104,17 @@ def test_a_heat_that_begins_anew_in_every_run_lasts() -> None:
     assert [effect.name for effect in baseline_effects(rig, decision)] == ["motor_heating"]
 
 
-def test_what_a_run_begins_with_is_another_in_each_and_no_news() -> None:
-    """A wheel that is set down otherwise each time."""
+@pytest.mark.parametrize("loss", [0.0, 0.006])
+def test_what_a_run_begins_with_is_no_news_and_hides_none(loss: float) -> None:
+    """A wheel that is set down otherwise each time; beside it a small friction that is new."""
+    friction = (make("coulomb_friction", {"loss": loss}),) if loss else ()
     runs = []
-    for seed in (3, 4):
-        each = [record(plan(seed=seed), (replace(BEGINNING, pull=p, torque=p),)) for p in PULLS]
+    for seed, new in ((3, ()), (4, friction)):
+        begins = [replace(BEGINNING, pull=p, torque=p) for p in PULLS]
+        each = [record(plan(seed=seed), (one, *new)) for one in begins]
         runs += [begun[number] for number, begun in enumerate(each)]
     rig = wheel_rig(runs, settings(), 3, "same")
-    assert not begin(prepare_screening(fit_base(rig))).first.alarmed
+    assert begin(prepare_screening(fit_base(rig))).first.alarmed == bool(loss)
 
 
 def test_what_goes_with_the_day_does_not() -> None:

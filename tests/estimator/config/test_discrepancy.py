@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli.yaml_edit import EditedYaml
-from gritd.tools.diagnose.explain.apply_form import set_discrepancy
+from gritd.tools.diagnose.explain.apply import set_discrepancy
 from tests import forms
 from tests.estimator.config.rig import MINIMAL, message
 

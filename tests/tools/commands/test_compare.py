@@ -16,7 +16,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.yaml_edit import EditedYaml
 from gritd.tools.commands import simulate
 from gritd.tools.commands.compare import compare, main
-from gritd.tools.diagnose.explain.apply_form import set_discrepancy
+from gritd.tools.diagnose.explain.apply import set_discrepancy
 from gritd.tools.report import comparison
 from tests import forms
 

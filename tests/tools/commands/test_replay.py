@@ -23,7 +23,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.yaml_edit import EditedYaml
 from gritd.tools.commands import replay, replay_verify
-from gritd.tools.diagnose.explain.apply_form import set_discrepancy
+from gritd.tools.diagnose.explain.apply import set_discrepancy
 from tests import forms
 from tests.linear_plant import readings
 

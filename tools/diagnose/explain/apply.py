@@ -4,17 +4,17 @@ simulator, daemon, next campaign.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import atan, cos, hypot, inf
 
-from gritd.estimator.config.configuration import Configuration
-from gritd.estimator.config.settings import Settings
+from gritd.estimator.config.configuration import Configuration, loads
+from gritd.estimator.config.settings import Settings, SoilPrior
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Parameter
+from gritd.estimator.model.learnt import CHANNELS, Domain, LearntForm, LearntSoil
 from gritd.estimator.visible import visible
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
-from gritd.tools.diagnose.explain.apply_form import set_discrepancy
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity
 
 HEADER = "# made by gritd diagnose: "
@@ -24,6 +24,7 @@ MODULI = {
     "bekker": (("k_c", "Pa/m^(n-1)"), ("k_phi", "Pa/m^n")),
     "reece": (("k1", "Pa"), ("k2", "Pa/m")),
 }
+CHANNEL_UNITS = ("N*m", "N", "m")  # of CHANNELS
 KNOWN = ("consistent", "explained")  # verdicts under which the fitted soil is believed alone
 
 
@@ -69,8 +70,10 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
 
     for effect, parameters in parameters_of.items():
         document.remove("effects", effect)
-        for name, fragment in _fragments(effect, parameters).items():
-            document.set(("effects", effect, name), fragment)
+        known = {p.name: p for p in EFFECTS[effect].parameters()}
+        for name, found in parameters.items():
+            if name in known:
+                document.set(("effects", effect, name), _stated(known[name], found))
 
 
 def _had(diagnosis: Diagnosis) -> dict[str, Mapping[str, Quantity]]:
@@ -98,13 +101,8 @@ def _sum(had: Quantity, new: Quantity, strength: Parameter) -> Quantity:
     return replace(new, value=value, sigma=hypot(had.sigma, new.sigma))
 
 
-def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str]:
-    """YAML text of each parameter; no σ is wider than a configuration may state."""
-    known = {p.name: p for p in EFFECTS[effect].parameters()}
-    return {n: _stated(known[n], stated) for n, stated in parameters.items() if n in known}
-
-
 def _stated(parameter: Parameter, found: Quantity) -> str:
+    """YAML text of a parameter; no σ is wider than a configuration may state."""
     low, high = parameter.low, parameter.high
     return quantity(found.value, min(found.sigma, high), parameter.unit, bounds=(low, high))
 
@@ -151,3 +149,65 @@ def _set_moduli(
     relative = min(modulus.sigma / modulus.value, 1.0)
     before = document.written("soil", "modulus_sigma")
     document.set(("soil", "modulus_sigma"), quantity(relative, 0.0, "", before or "1 %"))
+
+
+# ---- the learnt discrepancy of form --------------------------------------------------------------
+
+
+def set_discrepancy(document: EditedYaml, form: LearntForm, source: str) -> None:
+    """Put it in the place of an earlier one, with the values of the soil as the document has it."""
+    document.remove("discrepancy")
+    soil = loads(document.text(), source).settings.soil
+
+    values = {"load": _plain(form.load, "N"), "speed": _plain(form.speed, "m/s")}
+    values |= {"domain": _domain(form.domain), "points": _rows(form.points)}
+    for name, channel, unit in zip(CHANNELS, form.channels, CHANNEL_UNITS, strict=True):
+        if channel is not None:
+            values[name] = _mapping(
+                size=_plain(channel.size, unit),
+                mean=_list(channel.mean),
+                spread=_rows(channel.spread),
+                rest=_plain(channel.rest),
+            )
+    if form.soil is not None:
+        values["soil"] = _learnt_soil(form.soil, soil)
+
+    for name, fragment in values.items():
+        document.set(("discrepancy", name), fragment)
+
+
+def _learnt_soil(learnt: LearntSoil, soil: SoilPrior) -> str:
+    return _mapping(
+        cohesion=_plain(soil.cohesion.value, "Pa"),
+        tan_phi=_plain(soil.tan_phi.value),
+        shear_modulus=_plain(soil.shear_modulus.value, "m"),
+        with_cohesion=_list(learnt.with_cohesion),
+        with_tan_phi=_list(learnt.with_tan_phi),
+        with_shear_modulus=_list(learnt.with_shear_modulus),
+        among=_list(learnt.among),
+    )
+
+
+def _domain(domain: Domain) -> str:
+    return _mapping(
+        slip=_list(domain.slip),
+        load=_list(domain.load, "N"),
+        speed=_list(domain.speed, "m/s"),
+        travel=domain.travel,
+    )
+
+
+def _mapping(**items: str) -> str:
+    return "{" + ", ".join(f"{key}: {item}" for key, item in items.items()) + "}"
+
+
+def _rows(rows: Sequence[Sequence[float]]) -> str:
+    return "[" + ", ".join(_list(row) for row in rows) + "]"
+
+
+def _list(values: Sequence[float], unit: str = "") -> str:
+    return "[" + ", ".join(_plain(value, unit) for value in values) + "]"
+
+
+def _plain(value: float, unit: str = "") -> str:
+    return quantity(value, 0.0, unit)

@@ -35,7 +35,6 @@ from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out,
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
-from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.search import EffectSearch, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import QUIET, Decision
@@ -63,10 +62,13 @@ def explain(
     unlisted = decision.verdict == "unlisted"
     law = find_law(search, location, soil, after) if unlisted else None
     left, fit = remainders(problem, accepted), _fit(problem, before, after)
+    screen, far = search.first, strains(rig, accepted)
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary(decision, location, fit, search.first, rig, strains(rig, accepted)),
-        test=_test(search.first),
+        summary=summary(decision, location, fit, screen, rig, far),
+        test=Test(
+            label(screen.largest), screen.ratio, screen.threshold, screen.p, TUNING.screen.level, 0
+        ),
         location=location,
         hypotheses=hypotheses,
         soil=soil,
@@ -76,7 +78,7 @@ def explain(
         caveats=_caveats(search, decision, redo, location),
         share=decision.share,
         remaining=left,
-        remaining_words=_remaining(decision, bool(strains(rig, accepted)), left, bool(rig.forms)),
+        remaining_words=_remaining(decision, bool(far), left, bool(rig.forms)),
         discrepancy=discrepancies(problem, accepted),
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
@@ -100,11 +102,6 @@ def explain(
         scatters=scatters(problem, location, before, after),
         redo=redo,
     )
-
-
-def _test(screen: Screen) -> Test:
-    first = label(screen.largest)
-    return Test(first, screen.ratio, screen.threshold, screen.p, TUNING.screen.level, 0)
 
 
 def _located(search: EffectSearch, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
@@ -202,11 +199,8 @@ def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[st
     found = {}
     for f, x, s in zip(model.fitted.free, *model.parameters(), strict=True):
         if f.name == name and (p := f.parameter):
-            value, own, unit = (
-                f.value(float(x)),
-                float(s) * p.sigma,
-                rig.unit_factors.get(p.unit, 1.0),
-            )
+            value, own = f.value(float(x)), float(s) * p.sigma
+            unit = rig.unit_factors.get(p.unit, 1.0)
             other = forms * (value - p.off) if p.role == "strength" else 0.0
             found[p.name] = Quantity(value * unit, hypot(own, other) * unit, p.unit)
     return found

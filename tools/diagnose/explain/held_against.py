@@ -40,17 +40,12 @@ def _outside(stack: Stack) -> str:
     for name in NAMED:
         values = stack.covariate(name)
         known, asked = values[driving & ~stack.new], values[driving & stack.new]
-        room = TUNING.explain.beyond * max(
-            float(np.ptp(known)), TUNING.explain.beyond * abs(float(np.mean(known)))
-        )
+        low, high, share = float(known.min()), float(known.max()), TUNING.explain.beyond
+        room = share * max(high - low, share * abs(float(np.mean(known))))
 
-        for beyond, end, word in (
-            (asked > known.max() + room, float(known.max()), "above"),
-            (asked < known.min() - room, float(known.min()), "below"),
-        ):
-            if np.mean(beyond) > TUNING.explain.beyond:
-                parts.append(
-                    f"{percent(float(np.mean(beyond)))} {word} {value_of(stack, name, end)}"
-                )
+        above = asked > high + room, high, "above"
+        for beyond, end, word in (above, (asked < low - room, low, "below")):
+            if (part := float(np.mean(beyond))) > share:
+                parts.append(f"{percent(part)} {word} {value_of(stack, name, end)}")
 
     return "; ".join(parts) or "nothing"

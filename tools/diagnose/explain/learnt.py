@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import block_diag, solve_triangular
@@ -80,16 +81,13 @@ class _Unknowns:
         assert marginal is not None
         names = [f.name for f in marginal.terms]
         self.numbers = {s.name: names.index(s.name) for s in sources}
-        self.places: list[slice] = []  # of each freedom
-        parts, known = [np.arange(len(fitted.centre))], len(fitted.centre)
-        for number in range(len(names)):
-            parts.append(marginal.place_of(number))
-            self.places.append(slice(known, known + len(parts[-1])))
-            known += len(parts[-1])
         # what the configuration left open of an earlier δ stands last in the tolerance
         self.held = problem.stack.doubts
-        parts.append(marginal.last_of_tolerance(self.held.shape[1]))
-        self.place_of_held = slice(known, known + len(parts[-1]))
+        last = marginal.last_of_tolerance(self.held.shape[1])
+        freedoms = [marginal.place_of(number) for number in range(len(names))]
+        parts = [np.arange(len(fitted.centre)), *freedoms, last]
+        ends = np.cumsum([len(part) for part in parts]).tolist()
+        *self.places, self.place_of_held = (slice(*pair) for pair in pairwise(ends))
         self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))
 
         count = len(fitted.u)

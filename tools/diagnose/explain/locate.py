@@ -38,14 +38,7 @@ from gritd.tools.diagnose.tuning.guards import SPAN
 
 PREPARED = (("run",), ("position",))  # along which soil is made, not driven
 STRAINED = ("scale", "offset")  # constants of a channel's calibration
-
-
-@dataclass(frozen=True)
-class Place:
-    """A place of the misfit with the nats that it takes."""
-
-    nats: float
-    location: Location
+Place = tuple[float, Location]  # with the nats that it takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +120,9 @@ def locate(
     places = _strains(stack, model)
     for channel in stack.rig.channels:
         places += _places(stack, residual, tried, channel)
-    places.sort(key=lambda place: -place.nats)
     named: dict[tuple[str, str], Location] = {}
-    for place in places:  # of those of one channel and covariate the first
-        named.setdefault((place.location.channel, place.location.covariate), place.location)
+    for _, place in sorted(places, key=lambda each: -each[0]):
+        named.setdefault((place.channel, place.covariate), place)  # of several the first
     return tuple(named.values())
 
 
@@ -156,7 +148,7 @@ def dictionary(screening: Screening, model: Model) -> Dictionary:
         if f.shape.along == ("constant",)
     }
     about = [
-        np.union1d(own, means[f.shape.channel]) if f.shape.channel in means else own
+        np.union1d(own, means.get(f.shape.channel, own))
         for f, own in zip(functions, parts.own, strict=True)
     ]
     steps = [f.shape for f in families if f.shape.kind == "step"]  # and stretches between two
@@ -191,7 +183,7 @@ def _places(stack: Stack, residual: Array, tried: Dictionary, channel: str) -> l
                 channel, covariate, share, p, min(p * kinds, 1.0), words,
                 tuple(_changes(covariate, shapes)),
             )  # fmt: skip
-            places.append(Place(nats, location))
+            places.append((nats, location))
     return places
 
 
@@ -240,5 +232,5 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
         if kind in STRAINED and abs(u) > TUNING.explain.doubtful:
             words = wording.strain(channel, kind, constant.of(u), constant.unit, u)
             p, share = float(2.0 * ndtr(-abs(u))), taken / float(nats.sum())
-            places.append(Place(taken, Location(channel, "constant", share, p, p, words)))
+            places.append((taken, Location(channel, "constant", share, p, p, words)))
     return places

@@ -88,9 +88,8 @@ class Hypothesis:
     sentence: str = ""  # the effect in plain words
     equation: str = ""  # what it changes, and how
     score_nats: float = 0.0  # of its signature, before the nonlinear fit
-    separated_by: Mapping[str, str] = field(
-        default_factory=dict
-    )  # rival -> what would distinguish them, in words
+    # rival -> what would distinguish them, in words
+    separated_by: Mapping[str, str] = field(default_factory=dict)
     other_forms: float = 0.0
 
     @property
@@ -311,18 +310,14 @@ class Diagnosis:
     law: Law | None
     next_experiment: NextExperiment | None
     caveats: tuple[str, ...]
-    nuisance: Mapping[
-        str, Quantity
-    ]  # calibration constants that floated, fitted with the accepted effects
-    noise: Mapping[
-        str, Mapping[str, float]
-    ]  # channel -> sigma of a grid value, correlation time [s], configured sigma
+    nuisance: Mapping[str, Quantity]  # calibration constants, fitted with the accepted effects
+    # channel -> sigma of a grid value, correlation time [s], shares of slow and fast noise
+    noise: Mapping[str, Mapping[str, float]]
     baseline: tuple[str, ...]  # effects the configuration already held
     traces: tuple[Trace, ...]
     scatters: tuple[Scatter, ...]
-    redo: Mapping[
-        str, Any
-    ]  # files with their SHA-256, configuration text, seed, versions, settings of the engine
+    # files with their SHA-256, configuration text, seed, versions, settings of the engine
+    redo: Mapping[str, Any]
 
     share: float = 0.0  # of the misfit that the accepted names take
     remaining_words: str = ""

@@ -19,22 +19,21 @@ ALONG = {"angle": "1/turn", "time": "Hz"}
 
 def ripples_of(rig: Rig) -> tuple[Ripple, ...]:
     """All lines of the new campaign, the likeliest first."""
-    return tuple(_ripple(rig, line) for line in sorted(rig.lines.new, key=lambda x: x.p))
-
-
-def _ripple(rig: Rig, line: SpectralLine) -> Ripple:
-    return Ripple(
-        line.channel,
-        line.at,
-        line.sigma,
-        ALONG[line.axis],
-        line.size,
-        line.size_sigma,
-        rig.units[line.channel],
-        line.p,
-        line.frequency,
-        line.harmonic or None,
-        rig.lines.shared(line),
+    return tuple(
+        Ripple(
+            line.channel,
+            line.at,
+            line.sigma,
+            ALONG[line.axis],
+            line.size,
+            line.size_sigma,
+            rig.units[line.channel],
+            line.p,
+            line.frequency,
+            line.harmonic or None,
+            rig.lines.shared(line),
+        )
+        for line in sorted(rig.lines.new, key=lambda x: x.p)
     )
 
 
@@ -49,7 +48,8 @@ def left_over(rig: Rig, accepted: Sequence[Effect], places: Collection[str] = ()
         )
 
     named = [order for effect in accepted if (order := ripples_a_turn(effect)) is not None]
-    ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
+    fresh = rig.lines.fresh("angle")
+    ripples = [x for x in fresh if not any(abs(x.at - order) < x.cell for order in named)]
     if ripples:
         yield f"The wheel ripples, and no accepted effect does: {_listed(rig, ripples)}."
     if vibrations := [x for x in rig.lines.fresh("time") if x.channel not in places]:
@@ -66,22 +66,14 @@ def _listed(rig: Rig, lines: Sequence[SpectralLine]) -> str:
 
 def _place(rig: Rig, group: Sequence[SpectralLine]) -> str:
     first = group[0]
-    sizes = ", ".join(f"{spelled(x.channel)} ± {_size(rig, x)}" for x in group)
+    each = ((x, *shown(rig.units[x.channel])) for x in group)
+    sizes = ", ".join(f"{spelled(x.channel)} ± {spaced(x.size * f, u, 2)}" for x, u, f in each)
     low, high = first.frequency
 
     if first.axis == "time":
         return f"{first.at:.2f} Hz ({sizes})"
     hertz = " to ".join(dict.fromkeys((f"{low:.1f}", f"{high:.1f}")))
     return f"{first.at:.2f} times a turn, {hertz} Hz ({sizes})"
-
-
-def _size(rig: Rig, line: SpectralLine) -> str:
-    unit, factor = shown(rig.units[line.channel])
-    return spaced(line.size * factor, unit, 2)
-
-
-def _taken(line: SpectralLine, orders: Sequence[float]) -> bool:
-    return any(abs(line.at - order) < line.cell for order in orders)
 
 
 def _grouped(lines: Sequence[SpectralLine]) -> list[list[SpectralLine]]:

@@ -119,24 +119,16 @@ def _brief(words: str) -> str:
     return words.replace(" than the model", "")
 
 
-def _amplitude(stack: Stack, channel: str, amplitude: float) -> str:
-    unit, factor = shown(stack.rig.units[channel])
-    return f"± {spaced(abs(amplitude) * factor, unit, 2)}"
-
-
-def _length(stack: Stack, axis: str, length: float) -> str:
-    unit, factor = shown(stack.rig.units[axis])
-    return spaced(length * factor, unit, 3)
-
-
 def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
     (axis,), at = shape.along, shape.at
     assert at is not None
-    amplitude = _amplitude(stack, shape.channel, size)
+    unit, factor = shown(stack.rig.units[shape.channel])
+    amplitude = f"± {spaced(abs(size) * factor, unit, 2)}"
     if axis == "wheel_angle":
         turns = round(2.0 * np.pi * at, 2)
         return f"ripples {TIMES.get(int(turns), f'{turns:.4g} times')} a turn, {amplitude}"
-    length = _length(stack, axis, 1.0 / at)
+    unit, factor = shown(stack.rig.units[axis])
+    length = spaced(factor / at, unit, 3)
     if axis == "time":
         return f"{OSCILLATES} {length}, {amplitude}"
     return f"waves of {length} along the bed, {amplitude}"

@@ -197,9 +197,8 @@ def _recursion(
     """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the
     innovation (n, g). beside: (n,) or (n, g) variance of white noise beside that of each colour.
     """
-    times = np.array(
-        [[c.time for c in colours], [TUNING.noise.fast_time * step_of(gaps)] * len(colours)]
-    )
+    fast_time = TUNING.noise.fast_time * step_of(gaps)
+    times = np.array([[c.time for c in colours], [fast_time] * len(colours)])
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
     own = np.zeros(len(gaps)) if beside is None else beside
 
@@ -214,11 +213,8 @@ def _recursion(
     ss, ff, sf = slow, fast, 0.0 * slow
 
     for i, ((a, b), alone) in enumerate(zip(decays, white, strict=True)):
-        ss, ff, sf = (
-            a * a * ss + slow * (1 - a * a),
-            b * b * ff + fast * (1 - b * b),
-            a * b * sf,
-        )
+        ss, ff = a * a * ss + slow * (1 - a * a), b * b * ff + fast * (1 - b * b)
+        sf = a * b * sf
         to_slow, to_fast = ss + sf, ff + sf
         total = to_slow + to_fast + alone
         by_slow, by_fast = to_slow / total, to_fast / total
@@ -248,9 +244,7 @@ def whiten_rows(noise: Noise, columns: Array, rows: Bools) -> Array:
 def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     """Of noise of a colour (n, n) at times (n,)."""
     apart = np.abs(time[:, None] - time[None, :])
-    slow, fast = (
-        np.exp(-apart / colour.time),
-        np.exp(-apart / (TUNING.noise.fast_time * step_of(gaps))),
-    )
+    slow = np.exp(-apart / colour.time)
+    fast = np.exp(-apart / (TUNING.noise.fast_time * step_of(gaps)))
     white = (1.0 - colour.slow - colour.fast) * np.eye(len(time))
     return np.asarray(colour.sigma**2 * (white + colour.slow * slow + colour.fast * fast))

@@ -64,10 +64,8 @@ def _binned(values: Array) -> Index:
     an edge.
     """
     tried = [np.floor(values + phase).astype(int) for phase in TUNING.noise.cell_phases]
-    return max(
-        tried,
-        key=lambda bins: float(np.sum(np.unique(bins, return_counts=True)[1].astype(float) ** 2)),
-    )
+    counts = [np.unique(bins, return_counts=True)[1].astype(float) for bins in tried]
+    return tried[int(np.argmax([np.sum(count**2) for count in counts]))]
 
 
 class HeldCondition(NamedTuple):
@@ -119,24 +117,15 @@ def _held(
     for run in range(len(stack.rig.runs)):
         own = _driven(stack, number, run)
         only = _one_condition(own, label)
-        masks = (
-            [own]
-            if only
-            else [own & (label == cell) for cell in np.unique(label[own & (label >= 0)])]
-        )
+        held = [own & (label == cell) for cell in np.unique(label[own & (label >= 0)])]
 
-        for mask in (m for m in masks if m.sum() >= TUNING.noise.cell_values):
-            shapes = _shapes(stack.time[mask])[:, : None if only else 1]
-            inverse = np.linalg.pinv(shapes)
+        for mask in (m for m in ([own] if only else held) if m.sum() >= TUNING.noise.cell_values):
+            inverse = np.linalg.pinv(_shapes(stack.time[mask])[:, : None if only else 1])
             noise = covariance(colour, stack.time[mask], stack.gaps[mask])
-            coefficients = np.full((2, TUNING.noise.drift_shapes), np.nan)
-            coefficients[:, : shapes.shape[1]] = (
-                inverse @ residual[mask],
-                np.diag(inverse @ noise @ inverse.T),
-            )
-            yield HeldCondition(
-                run, conditions[mask].mean(axis=0), coefficients[0], coefficients[1]
-            )
+            shape, chance = np.full((2, TUNING.noise.drift_shapes), np.nan)
+            shape[: len(inverse)] = inverse @ residual[mask]
+            chance[: len(inverse)] = np.diag(inverse @ noise @ inverse.T)
+            yield HeldCondition(run, conditions[mask].mean(axis=0), shape, chance)
 
 
 def _driven(stack: Stack, number: int, run: int) -> Bools:
@@ -150,27 +139,19 @@ def _one_condition(own: Bools, label: Index) -> bool:
     meanwhile.
     """
     most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
-    return bool(
-        most
-        >= max(
-            TUNING.noise.cell_values * TUNING.noise.drift_shapes, TUNING.noise.mostly * own.sum()
-        )
-    )
+    least = TUNING.noise.cell_values * TUNING.noise.drift_shapes
+    return bool(most >= max(least, TUNING.noise.mostly * own.sum()))
 
 
 def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCondition | None:
     """The next run that held the same condition on equal terms."""
-    later = [
-        two
-        for two in held
-        if two.run > one.run
-        and np.abs(two.condition - one.condition).max() <= 1.0
-        and np.abs(terms[two.run] - terms[one.run]).max() <= WAY
-    ]
 
-    return min(
-        later, key=lambda two: (two.run, np.abs(two.condition - one.condition).max()), default=None
-    )
+    def apart(two: HeldCondition) -> float:
+        return float(np.abs(two.condition - one.condition).max())
+
+    later = [two for two in held if two.run > one.run and apart(two) <= 1.0]
+    alike = [two for two in later if np.abs(terms[two.run] - terms[one.run]).max() <= WAY]
+    return min(alike, key=lambda two: (two.run, apart(two)), default=None)
 
 
 def _shapes(time: Array) -> Array:
@@ -188,24 +169,18 @@ def _spread(differences: list[tuple[Array, Array]]) -> Array:
     """
     count = TUNING.noise.drift_shapes
     out = np.zeros(count)
-    for order, (difference, chance) in enumerate(
-        np.array(differences).reshape(-1, 2, count).transpose(2, 1, 0)
-    ):
+    every = np.array(differences).reshape(-1, 2, count).transpose(2, 1, 0)
+    for order, (difference, chance) in enumerate(every):
         known = np.isfinite(difference)
         squares, chance = difference[known] ** 2, chance[known]
         if squares.size >= TUNING.noise.least_pairs:
             rare = chdtrc(squares.size, float(np.sum(squares / chance))) < TUNING.screen.level
             if order == 0 or rare:
-                out[order] = np.sqrt(
-                    _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)
-                )
+                # variance of Student's t: known from few differences, it must be taken larger
+                few = (squares.size + 2.0) / squares.size
+                out[order] = np.sqrt(few * max(0.5 * float(np.mean(squares - chance)), 0.0))
 
     return out
-
-
-def _few(count: int) -> float:
-    """Variance of Student's t: a variance known from few differences must be taken larger."""
-    return (count + 2.0) / count
 
 
 def _terms(stack: Stack) -> Array:

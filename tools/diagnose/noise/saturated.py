@@ -44,8 +44,7 @@ def basis(columns: Array, most: int | None = None) -> Array:
 
     most = TUNING.noise.saturated_columns if most is None else most
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.flatnonzero(values > TUNING.numerics.rank * max(values[-1], SQUARE))[
-        -max(min(columns.shape[0] // TUNING.noise.values_per_column, most), 1) :
-    ]
+    most = max(min(columns.shape[0] // TUNING.noise.values_per_column, most), 1)
+    kept = np.flatnonzero(values > TUNING.numerics.rank * max(values[-1], SQUARE))[-most:]
     basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     return basis

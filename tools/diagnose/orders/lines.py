@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.orders.spectrum import log_chance, places_of, spectrum
+from gritd.tools.diagnose.orders.spectrum import log_chance, places_of, spectrum, sums_at
 from gritd.tools.diagnose.orders.stretches import Samples
-from gritd.tools.diagnose.orders.transform import sums_at
 from gritd.tools.diagnose.orders.wave import Amplitude, amplitude_of, wave_of
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
@@ -69,8 +68,7 @@ def size_in(runs: Sequence[Mapping[str, Samples]], line: SpectralLine) -> float:
     too little of it to tell.
     """
     sizes = []
-    for part in _parts(runs, line.channel):
-        samples = part.samples
+    for _, samples in _parts(runs, line.channel):
         if line.at * samples.span(line.axis) >= TUNING.orders.cycles:
             left = samples.values - wave_of(samples, line.axis, line.at, whole=True)
             level = float(np.mean(left**2))
@@ -84,27 +82,25 @@ def _size(amplitudes: Sequence[Amplitude]) -> float:
     return float(np.sqrt(max(float(np.mean(squares)), 0.0))) if squares else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """A part of a run."""
-
-    run: int
-    samples: Samples  # without trend
-
-
 class _Channel:
-    """The spectra of one channel, less the lines found so far."""
+    """The spectra of one channel, less the lines found so far.
 
-    def __init__(self, name: str, parts: Sequence[_Part], axes: Sequence[str] = AXES) -> None:
-        self.name, self.parts = name, list(parts)
+    parts: of runs, each with the number of its run, without trend.
+    """
+
+    def __init__(
+        self, name: str, parts: Sequence[tuple[int, Samples]], axes: Sequence[str] = AXES
+    ) -> None:
+        self.name, self._run = name, [run for run, _ in parts]
+        self.parts = [samples for _, samples in parts]
         self._waves: dict[tuple[str, float], list[Array]] = {}  # of each line taken, in each part
-        self.places = {axis: places_of([p.samples for p in parts], axis) for axis in axes}
+        self.places = {axis: places_of(self.parts, axis) for axis in axes}
         self._renew()
         self._first = dict(self.chances)
 
     def _renew(self) -> None:
         self.spectra = {
-            axis: [spectrum(p.samples, axis, places) for p in self.parts]
+            axis: [spectrum(part, axis, places) for part in self.parts]
             for axis, places in self.places.items()
         }
         self._cleaned: dict[str, float] = {}  # of the strongest place of each axis
@@ -138,9 +134,7 @@ class _Channel:
         at, places = self.refined(axis, place), self.places[axis]
         beside = []
         for part, before in zip(self.parts, self.spectra[axis], strict=True):
-            without = part.samples.with_values(
-                part.samples.values - wave_of(part.samples, axis, at, whole=True)
-            )
+            without = part.with_values(part.values - wave_of(part, axis, at, whole=True))
             after = spectrum(without, axis, places)
             beside.append(replace(after, power=before.power))
 
@@ -170,32 +164,29 @@ class _Channel:
         gain = np.zeros(tried.size)
         for part, s in zip(self.parts, self.spectra[axis], strict=True):
             if np.isfinite(s.level[place]):
-                samples = part.samples
-                power = np.abs(sums_at(samples.of(axis), samples.values, tried)) ** 2
-                power /= samples.values.size
+                power = np.abs(sums_at(part.of(axis), part.values, tried)) ** 2
+                power /= part.values.size
                 freedom = s.freedom[place]
                 gain += 0.5 * freedom * np.log1p(2.0 * power / s.level[place] / freedom)
         return gain
 
     def amplitudes(
-        self, before: Sequence[_Part], axis: str, at: float, runs: int
+        self, before: Sequence[Samples], axis: str, at: float, runs: int
     ) -> tuple[Amplitude | None, ...]:
         """Of each run, its parts together, as they were before the line was taken."""
         place = min(round(at / self.places[axis].spacing), self.places[axis].count - 1)
 
         of_runs: list[list[Amplitude]] = [[] for _ in range(runs)]
-        for part, s in zip(before, self.spectra[axis], strict=True):
+        for run, part, s in zip(self._run, before, self.spectra[axis], strict=True):
             if np.isfinite(s.level[place]):
-                of_runs[part.run].append(
-                    amplitude_of(part.samples, axis, at, float(s.level[place]))
-                )
+                of_runs[run].append(amplitude_of(part, axis, at, float(s.level[place])))
         return tuple(_together(each) for each in of_runs)
 
     def take(self, axis: str, at: float) -> None:
         """Leave a line out. Those taken before it are estimated anew beside it, each in turn: Li
         and Stoica (1996), IEEE Trans. Signal Process. 44, 281-295.
         """
-        self._waves[axis, at] = [np.zeros(part.samples.values.size) for part in self.parts]
+        self._waves[axis, at] = [np.zeros(part.values.size) for part in self.parts]
         for _ in range(TUNING.numerics.sweeps if len(self._waves) > 1 else 1):
             for line in reversed(self._waves):
                 self._retake(*line)
@@ -203,27 +194,24 @@ class _Channel:
 
     def _retake(self, axis: str, at: float) -> None:
         """Put a line back and leave it out as it now is."""
+        waves = self._waves[axis, at]
         for number, part in enumerate(self.parts):
-            waves = self._waves[axis, at]
-            whole = part.samples.with_values(part.samples.values + waves[number])
+            whole = part.with_values(part.values + waves[number])
             waves[number] = wave_of(whole, axis, at)
-            left = whole.with_values(whole.values - waves[number])
-            self.parts[number] = replace(part, samples=left)
+            self.parts[number] = whole.with_values(whole.values - waves[number])
 
     def cell(self, axis: str) -> float:
         """What the longest part resolves."""
-        return 1.0 / max(part.samples.span(axis) for part in self.parts)
+        return 1.0 / max(part.span(axis) for part in self.parts)
 
     def spread(self, axis: str, at: float, amplitudes: Sequence[Amplitude | None]) -> float:
         """Standard deviation of the line's place: Rife and Boorstyn (1974), IEEE Trans. Inf. Theory
         20, 591-598, var f = 3 var a/(π² A² T²) of each part.
         """
         precision = 0.0
-        for part in self.parts:
-            a = amplitudes[part.run]
-            if a is not None:
-                length = part.samples.span(axis)
-                precision += (np.pi * length * a.size / a.sigma) ** 2 / 3.0
+        for run, part in zip(self._run, self.parts, strict=True):
+            if (a := amplitudes[run]) is not None:
+                precision += (np.pi * part.span(axis) * a.size / a.sigma) ** 2 / 3.0
         return float(1.0 / np.sqrt(max(precision, SQUARE)))
 
     def frequency(self, axis: str, at: float) -> tuple[float, float]:
@@ -232,7 +220,7 @@ class _Channel:
             return at, at
         rates = [
             abs(float(s.angle[own][-1] - s.angle[own][0])) / max(float(np.ptp(s.time[own])), SPAN)
-            for s in (p.samples for p in self.parts)
+            for s in self.parts
             for own in s.slices
         ]
         return at * min(rates), at * max(rates)
@@ -263,10 +251,8 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
         at = first.refined(axis, place)
         support = sum(channel.support(axis, at) for channel in channels)
         for channel in (first, *(c for c in channels if c is not first)):
-            if channel is first:
-                log_p = chance + np.log(tried)
-            else:
-                log_p = channel.near(axis, at) + np.log(len(channels))
+            beside = channel.near(axis, at) + np.log(len(channels))
+            log_p = chance + np.log(tried) if channel is first else beside
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
                 lines += [line, *_overtones(channel, line, len(runs))]
@@ -277,8 +263,8 @@ def lines_along(parts: Sequence[Samples], searches: int) -> Iterator[float]:
     """Places of the lines of one channel along its time alone, each part with its own phase, the
     strongest first. searches: that are made like this one, all counted.
     """
-    without_trend = [p.with_values(p.detrended(p.values)) for p in parts]
-    channel = _Channel("", [_Part(0, p) for p in without_trend], ("time",))
+    without_trend = [(0, p.with_values(p.detrended(p.values))) for p in parts]
+    channel = _Channel("", without_trend, ("time",))
     sure = float(np.log(TUNING.orders.level / searches / channel.places["time"].count))
     for _ in range(TUNING.orders.most_lines):
         chance, place = channel.strongest("time", sure)
@@ -299,11 +285,12 @@ def _overtones(channel: _Channel, line: SpectralLine, runs: int) -> Iterator[Spe
             yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
 
 
-def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
+def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[tuple[int, Samples]]:
+    """The parts of a channel's runs, each with the number of its run, without trend."""
     for number, run in enumerate(runs):
         if name in run:
             for part in run[name].parts():
-                yield _Part(number, part.with_values(part.detrended(part.values)))
+                yield number, part.with_values(part.detrended(part.values))
 
 
 def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channel, str, int] | None:

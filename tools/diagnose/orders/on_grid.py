@@ -74,9 +74,8 @@ def _weights(
     weights[:] = np.linalg.lstsq(columns, values, rcond=None)[0]
     for part in own.slices:
         if line.at * float(np.ptp(own.of(line.axis)[part])) >= TUNING.orders.cycles:
-            weights[own.stretch[part.start]] = np.linalg.lstsq(
-                columns[part], values[part], rcond=None
-            )[0]
+            fitted = np.linalg.lstsq(columns[part], values[part], rcond=None)[0]
+            weights[own.stretch[part.start]] = fitted
     return weights
 
 

@@ -12,8 +12,6 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines
 from gritd.tools.diagnose.orders.lines import SpectralLine
-from gritd.tools.diagnose.orders.stretches import TURN
-from gritd.tools.diagnose.orders.wave import Amplitude
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -21,7 +19,8 @@ def guide(lines: Lines) -> SpectralLine | None:
     """The ripple by which the runs of the new campaign are aligned; None where they are already, or
     where one speed alone cannot tell it from a vibration.
     """
-    ripples = [line for line in lines.fresh() if line.p < TUNING.screen.line and _at_speeds(line)]
+    sure = [line for line in lines.fresh() if line.p < TUNING.screen.line]
+    ripples = [x for x in sure if x.frequency[1] > TUNING.orders.two_speeds * x.frequency[0]]
     if not ripples:
         return None
     best = max(ripples, key=lambda line: (line.support, -line.p))
@@ -34,27 +33,13 @@ def shifts(line: SpectralLine) -> Array:
     return np.array(_turns(line)) / line.at
 
 
-def _at_speeds(line: SpectralLine) -> bool:
-    low, high = line.frequency
-    return high > TUNING.orders.two_speeds * low
-
-
 def _turns(line: SpectralLine) -> list[float]:
     """By what the ripple of each run is behind that of the surest one [rad of the ripple]."""
     surest = max((a for a in line.amplitudes if a is not None), key=lambda a: a.size / a.sigma)
+    to = complex(surest.cos, surest.sin)
     return [
-        _wrapped(_phase(surest) - _phase(a)) if a is not None and _sure(a) else 0.0
+        float(np.angle(to * complex(a.cos, -a.sin)))
+        if a is not None and a.size > TUNING.rig.doubt * a.sigma
+        else 0.0
         for a in line.amplitudes
     ]
-
-
-def _phase(a: Amplitude) -> float:
-    return float(np.arctan2(a.sin, a.cos))
-
-
-def _sure(a: Amplitude) -> bool:
-    return a.size > TUNING.rig.doubt * a.sigma
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + 0.5 * TURN) % TURN - 0.5 * TURN)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
@@ -155,7 +155,7 @@ def _steady(motion: GridMotion) -> NDArray[np.bool_]:
     if motion.load is not None:
         ramp |= _changes(_without_pulses(motion.load, step), step)
     settling = round(TUNING.rig.settling / step)
-    return driving & ~_widened(turned, settling) & ~ramp
+    return np.asarray(driving & ~maximum_filter1d(turned, 2 * settling + 1) & ~ramp)
 
 
 def _without_pulses(load: Array, step: float) -> Array:
@@ -168,10 +168,8 @@ def _changes(held: Array, step: float) -> NDArray[np.bool_]:
     """(n,) a speed or a load changes by more than its noise about here."""
     reach = max(round(TUNING.orders.apart / step), 1)
     known = np.nan_to_num(held)
-    change = (
-        np.abs(known[2 * reach :] - known[: -2 * reach]) if known.size > 2 * reach else known[:0]
-    )
-    whole = np.pad(change, (reach, known.size - change.size - reach))
+    change = np.abs(known[2 * reach :] - known[: -2 * reach])
+    whole = np.pad(change, reach)
 
     noise = NORMAL * float(np.median(change))
     usual = float(np.median(np.abs(known[known != 0.0]))) if np.any(known) else 0.0
@@ -179,9 +177,3 @@ def _changes(held: Array, step: float) -> NDArray[np.bool_]:
     threshold = np.maximum(TUNING.orders.changed * least, TUNING.orders.change_noise * noise)
     marked: NDArray[np.bool_] = whole > threshold
     return marked
-
-
-def _widened(marks: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Marks (n,) and so many values to either side."""
-    kernel = np.ones(2 * reach + 1)
-    return np.asarray(np.convolve(marks.astype(float), kernel, mode="same") > 0.5)

@@ -136,24 +136,13 @@ def _soil(settings: Settings) -> tuple[Constant, ...]:
 
 def _floating(effects: Sequence[ConfiguredEffect], kind: str = "") -> tuple[Constant, ...]:
     """Parameters of effects float within their own uncertainty, kept inside their bounds."""
-    constants = []
-    for effect in effects:
-        for p in EFFECTS[effect.name].parameters():
-            stated = effect.parameters.get(p.name)
-            if stated is not None and stated.sigma > 0.0:
-                constants.append(
-                    Constant(
-                        f"{effect.name}.{p.name}",
-                        stated.value,
-                        stated.sigma,
-                        p.unit,
-                        low=p.low,
-                        high=p.high,
-                        kind=kind,
-                    )
-                )
-
-    return tuple(constants)
+    every = ((effect, p) for effect in effects for p in EFFECTS[effect.name].parameters())
+    known = ((e.name, p, e.parameters[p.name]) for e, p in every if p.name in e.parameters)
+    return tuple(
+        Constant(f"{name}.{p.name}", q.value, q.sigma, p.unit, low=p.low, high=p.high, kind=kind)
+        for name, p, q in known
+        if q.sigma > 0.0
+    )
 
 
 def preparation(settings: Settings) -> dict[str, float]:

@@ -106,14 +106,9 @@ class DriveModel:
     ) -> list[dict[str, Array]]:
         """Motor torque [N·m]: see interface.Predict."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
-        torques = [
-            self._torque(m, inertia / self.unit, damping / self.unit, effects) for m in self.motions
-        ]
-
-        return [
-            {"torque": m.compared(_timed(t, m.step, *timing))}
-            for m, t in zip(self.motions, torques, strict=True)
-        ]
+        inertia, damping = inertia / self.unit, damping / self.unit
+        torques = [(m, self._torque(m, inertia, damping, effects)) for m in self.motions]
+        return [{"torque": m.compared(_timed(t, m.step, *timing))} for m, t in torques]
 
     def _torque(
         self, motion: DriveMotion, inertia: float, damping: float, effects: Sequence[Effect]
@@ -141,9 +136,8 @@ class DriveModel:
 
 
 def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
-    velocity, torque, angle = (
-        motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
-    )
+    torque, angle = motion.compared(motion.torque), motion.compared(motion.angle)
+    velocity = motion.compared(motion.velocity)
     still = TUNING.rig.creep * usual
     fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
 
@@ -227,12 +221,10 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMo
     smooth = _low_passed(_averaged(fine, step, time, angle), TUNING.rig.sharp_cutoff)
     velocity = _rate(smooth, step)
 
-    torque = constant * _low_passed(
-        _averaged(fine, step, current_time, current), TUNING.rig.sharp_cutoff
-    )
-    return DriveMotion(
-        step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque
-    )
+    mean = _averaged(fine, step, current_time, current)
+    torque = constant * _low_passed(mean, TUNING.rig.sharp_cutoff)
+    turned = smooth, velocity, _rate(velocity, step)
+    return DriveMotion(step, sampled, fine - fine[0], *turned, torque)
 
 
 def _timed(torque: Array, step: float, delay: float, blur: float) -> Array:
@@ -247,16 +239,14 @@ def _rate(values: Array, step: float) -> Array:
     """Derivative by a cubic spline: differences would smooth the acceleration, and nothing else, by
     2 % at 10 Hz.
     """
-    return np.asarray(
-        CubicSpline(step * np.arange(values.size), values)(step * np.arange(values.size), 1)
-    )
+    time = step * np.arange(values.size)
+    return np.asarray(CubicSpline(time, values)(time, 1))
 
 
 def _low_passed(values: Array, cutoff: float) -> Array:
     """Through a zero-phase Butterworth filter; the cut-off in units of the sampling rate."""
-    return np.asarray(
-        sosfiltfilt(butter(TUNING.rig.filter_order, 2.0 * cutoff, output="sos"), values)
-    )
+    sections = butter(TUNING.rig.filter_order, 2.0 * cutoff, output="sos")
+    return np.asarray(sosfiltfilt(sections, values))
 
 
 def _averaged(fine: Array, step: float, time: Array, values: Array) -> Array:

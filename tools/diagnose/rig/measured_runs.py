@@ -107,12 +107,8 @@ def torque_is_held(runs: Sequence[GridRun]) -> bool:
     means = [float(values.mean()) for values in rests]
     noise = max((float(v.std() / np.sqrt(v.size)) for v in rests), default=0.0)
 
-    driven = np.concatenate(
-        [
-            values[run.used["torque"] & ~at]
-            for run, values, at in zip(runs, torque, rest, strict=True)
-        ]
-    )
+    used = [run.used["torque"] & ~at for run, at in zip(runs, rest, strict=True)]
+    driven = np.concatenate([values[at] for values, at in zip(torque, used, strict=True)])
     if len(means) < 2 or not driven.size:
         return False
     usual = float(np.sqrt(np.mean(driven**2)))

@@ -63,11 +63,13 @@ class Prediction:
         """See interface.Predict."""
         value = self._values(u)
         baseline = self._baseline(value)
+        # relative error of each set of weights for itself, the last of values without one
+        own = np.array([*(value[name] for name in self._data.sets.names), 0.0])
 
         true = []  # readings (channels, n) of each campaign before scale, offset and delay
         for new, campaign in self._campaigns:
             acting = (*baseline, *(e for e in effects if new or e.name in in_both))
-            weights = 1.0 + value["weights"] + self._own_weights(value)[self._data.set_of(new)]
+            weights = 1.0 + value["weights"] + own[self._data.set_of(new)]
             travelled = 1.0 + value["carriage_scale"]
             true.append(campaign.readings(self._soil(value, new), weights, travelled, acting))
 
@@ -105,12 +107,6 @@ class Prediction:
             make(e.name, {p: value.get(f"{e.name}.{p}", q.value) for p, q in e.parameters.items()})
             for e in self._settings.effects
         )
-
-    def _own_weights(self, value: Mapping[str, float]) -> Array:
-        """Relative error of each set of weights for itself (m + 1,), the last of values without
-        one.
-        """
-        return np.array([*(value[name] for name in self._data.sets.names), 0.0])
 
     def _soil(self, value: Mapping[str, float], new: bool) -> Soil:
         """The soil of one campaign: a bed that was prepared anew has its own."""

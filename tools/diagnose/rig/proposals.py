@@ -49,11 +49,8 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     speeds, slips, loads = LEVELS[key]
     time = np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.rate)) / TUNING.rig.rate
 
-    middle_speed, middle_load = (
-        _middle([np.abs(m.wheel_speed) for m in driven]),
-        _middle([m.load for m in driven]),
-    )
-    speed, slip = middle_speed * _stepped(speeds, time), _stepped(slips, time)
+    speed = _middle([np.abs(m.wheel_speed) for m in driven]) * _stepped(speeds, time)
+    slip = _stepped(slips, time)
 
     last = max(float(np.max(m.pass_number)) for m in driven)
     reached = max(float(np.max(np.asarray(m.start_position) + m.carriage_position)) for m in driven)
@@ -65,7 +62,7 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
         wheel_speed=speed,
         carriage_position=np.cumsum(travel) / TUNING.rig.rate,
         carriage_speed=travel,
-        load=middle_load * _stepped(loads, time),
+        load=_middle([m.load for m in driven]) * _stepped(loads, time),
         pass_number=last + 1.0 if key == "second_pass" else last,
         start_position=reached if key == "shifted_start" else 0.0,
     )

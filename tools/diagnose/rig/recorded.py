@@ -10,7 +10,6 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.candidates import tables
 from gritd.tools.diagnose.rig.constants import calibration_sigmas
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.rig.signals import Signals, filled
@@ -51,8 +50,10 @@ class Recorded:
 
     @property
     def tabled(self) -> bool:
-        """Whether the recordings are tables of steady states."""
-        return tables(self.signals)
+        """Whether all recordings are tables of steady states, as they say themselves: time, place
+        and wheel angle in them mean nothing. Short runs at steady speeds are none.
+        """
+        return all(signals.info.steady_states for signals in self.signals)
 
     def motions_of(self, new: bool) -> list[Motion]:
         """Those of the new campaign, or of the reference."""
@@ -96,11 +97,9 @@ def channels_of(
     channels = []
     for channel in ("torque", "axle_torque", "drawbar_pull", "side_force", "sinkage", "load"):
         there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
-        if (
-            there
-            and calibration_sigmas(settings, channel)[1] < TUNING.rig.unknown_offset
-            and (channel != "load" or all(weights_known))
-        ):
+        drives = channel == "load" and not all(weights_known)
+        known = there and calibration_sigmas(settings, channel)[1] < TUNING.rig.unknown_offset
+        if known and not drives:
             channels.append(channel)
 
     return tuple(channels)
@@ -122,12 +121,8 @@ def to_one_side(signals: Sequence[Signals]) -> list[Signals]:
     forces = [s.analogue["side_force"] for s in signals if "side_force" in s.analogue]
     if not forces or np.nanmean(np.concatenate(forces)) >= 0.0:
         return list(signals)
-    return [
-        replace(s, analogue=s.analogue | {"side_force": -s.analogue["side_force"]})
-        if "side_force" in s.analogue
-        else s
-        for s in signals
-    ]
+    turned = [{n: -v for n, v in s.analogue.items() if n == "side_force"} for s in signals]
+    return [replace(s, analogue=s.analogue | t) for s, t in zip(signals, turned, strict=True)]
 
 
 def _varies(values: Array | None) -> bool:

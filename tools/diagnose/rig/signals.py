@@ -47,9 +47,8 @@ class Signals:
     # relative standard deviation of the ratio of both speeds, of what the encoders' counts leave of
     # it
     doubt: Array
-    analogue: dict[
-        str, Array
-    ]  # sinkage, current, temperature, drawbar_pull, side_force, load, axle_torque; those there are
+    # sinkage, current, temperature, drawbar_pull, side_force, load, axle_torque; those there are
+    analogue: dict[str, Array]
     damage: tuple[str, ...]
     left_out: str = ""  # what of the recording is not used, in words
 
@@ -240,10 +239,8 @@ def _series(recording: Recording, channel: Channel) -> Series:
     if not rows.size:
         return _NONE
 
-    raw = rows[
-        next(name for name in ("count", "volts", "celsius") if name in (rows.dtype.names or ()))
-    ].astype(float)
-
+    names = rows.dtype.names or ()
+    raw = rows[next(n for n in ("count", "volts", "celsius") if n in names)].astype(float)
     good = np.isfinite(raw)
     if channel.name not in ("wheel_encoder", "carriage_encoder"):
         good &= (raw >= channel.low) & (raw <= channel.high)

@@ -9,6 +9,7 @@ both sides alike.
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.stages.situation import Motion
@@ -25,20 +26,12 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     rim = settings.wheel.radius * np.asarray(motion.wheel_speed)
     usual, way = _usual(rim), _way(rim)
 
-    load = np.asarray(motion.load)
-    carrying, lifted = (
-        load >= settings.load.minimum,
-        load < TUNING.rig.lifted * settings.load.minimum,
-    )
+    load, least = np.asarray(motion.load), settings.load.minimum
+    carrying, lifted = load >= least, load < TUNING.rig.lifted * least
     step = float(np.median(np.diff(np.asarray(motion.time))))
 
-    passing = float(
-        np.clip(
-            TUNING.rig.contact_angle / max(usual / settings.wheel.radius, SLIGHT),
-            TUNING.rig.settling,
-            TUNING.rig.longest_settling,
-        )
-    )
+    passing = TUNING.rig.contact_angle / max(usual / settings.wheel.radius, SLIGHT)
+    passing = min(max(passing, TUNING.rig.settling), TUNING.rig.longest_settling)
     settling = round(TUNING.rig.settling / step)
 
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
@@ -92,12 +85,7 @@ def _inside(state: Array, after: int, before: int) -> Bools:
     It may have begun before the recording and go on beyond it: the ends of a run are no change of
         state.
     """
-    n, at = state.size, np.arange(state.size)
-    changed = np.flatnonzero(np.diff(state)) + 1  # first intervals of a new state
-    bounds = np.concatenate(([-after - 1], changed, [n + before]))
-
-    place = np.searchsorted(changed, at, side="right")
-    inside: Bools = (
-        (state != 0.0) & (at - bounds[place] >= after) & (bounds[place + 1] - at > before)
-    )
-    return inside
+    window = after + before + 1
+    about = {"size": window, "origin": after - window // 2, "mode": "nearest"}
+    lasts = minimum_filter1d(state, **about) == maximum_filter1d(state, **about)
+    return np.asarray((state != 0.0) & lasts)

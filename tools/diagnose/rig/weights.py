@@ -63,17 +63,10 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
     near, lifted = np.abs(load - stated) <= apart, load <= TUNING.rig.lifted * stated
 
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
-    known = nominal is not None or abs(held - stated) <= TUNING.rig.doubt * _sigma(
-        settings.load.nominal, settings.wrench.load
-    )
-    if (
-        known
-        and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
-        and np.mean(near) > np.mean(lifted)
-    ):
-        return Weights(np.where(load > 0.5 * stated, constant, 0.0))
-
-    return measured
+    doubt = TUNING.rig.doubt * _sigma(settings.load.nominal, settings.wrench.load)
+    known = nominal is not None or abs(held - stated) <= doubt
+    mostly = np.mean(near | lifted) >= 1.0 - TUNING.rig.passing and np.mean(near) > np.mean(lifted)
+    return Weights(np.where(load > 0.5 * stated, constant, 0.0)) if known and mostly else measured
 
 
 def _measured(signals: Signals, settings: Settings) -> Weights | None:

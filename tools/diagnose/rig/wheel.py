@@ -4,7 +4,7 @@ forward model out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -13,9 +13,10 @@ import numpy as np
 
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import ConfiguredEffect, Settings
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
-from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import (
     UNITS,
     noise_of_readings,
@@ -94,7 +95,7 @@ def wheel_rig(
     alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
 
     data = recorded(signals, settings, reference, read_off)
-    left_out = _left_out(settings.effects, data.stated)
+    candidates = _candidates(data, settings.effects)
     settings = replace(settings, effects=_acting(settings.effects, data.stated))
     had = _acting(had, data.stated)
     acting = replace(settings, effects=(*settings.effects, *had))  # in both campaigns
@@ -119,14 +120,14 @@ def wheel_rig(
         channels=data.channels,
         units=UNITS,
         constants=constants,
-        effects=candidates(signals, left_out),
+        effects=candidates,
         new=data.new,
         predict=prediction.channels,
         words=_words(data, settings, runs, holding),
         smooth=SMOOTH,
         heated=("torque",),
         foresee=prediction.foresee,
-        having=partial(_with_more, again, had),
+        having=lambda more: again((*had, *more)),
         reference=alone if reference else None,
         baseline=configured(settings.effects),
         slipping="carriage_scale",
@@ -140,15 +141,6 @@ def wheel_rig(
         motion_sigma=motion_sigma,
         nuisances=() if data.tabled else (*unrest, *surfaces),
     )
-
-
-def _with_more(
-    again: Callable[[Sequence[ConfiguredEffect]], Rig],
-    had: Sequence[ConfiguredEffect],
-    more: Sequence[ConfiguredEffect],
-) -> Rig:
-    """The rig once more, with further effects beside those that it has in both campaigns."""
-    return again((*had, *more))
 
 
 def _held(data: Recorded, settings: Settings, runs: Sequence[GridRun]) -> Held | None:
@@ -229,10 +221,17 @@ def _reference_alone(
     return wheel_rig(signals, settings, read_off=read_off, lines=own)
 
 
-def _left_out(known: Sequence[ConfiguredEffect], weights_stated: bool) -> set[str]:
-    """Effects that are no candidates."""
-    names = {*LEFT_OUT, *(effect.name for effect in known)}
-    return names if weights_stated else names | {AXIS_FRICTION}
+def _candidates(data: Recorded, known: Sequence[ConfiguredEffect]) -> dict[str, type[Effect]]:
+    """The effects to look for, by name: of steady states only what they can show."""
+    left_out = {*LEFT_OUT, *(effect.name for effect in known)}
+    if not data.stated:
+        left_out.add(AXIS_FRICTION)
+
+    listed = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in left_out}
+    if not data.tabled:
+        return listed
+    shown = {name: effect.in_steady_states() for name, effect in listed.items()}
+    return {name: effect for name, effect in shown.items() if effect is not None}
 
 
 def _acting(

@@ -74,11 +74,6 @@ class Family:
         projected = [beside.project_block(block) for block in self.blocks]
         return np.stack([_weighed(projected, self.at.size, one, near) for one in self.phases])
 
-    def in_phase(self, beside: Projection, shared: bool) -> Array:
-        """The same (f,), with one coefficient for all blocks or one for each."""
-        projected = [beside.project_block(block) for block in self.blocks]
-        return _weighed(projected, self.at.size, shared, None)
-
     def average(self, beside: Projection) -> float:
         """Log Bayes factor of the family."""
         every = self.evidence(beside, self.near)
@@ -102,13 +97,12 @@ def _weighed(
 
     level = 1.0 if near is None else _level(sizes, powers, near)
 
-    parts = np.zeros((len(strength_sizes()), *powers[0].shape))
+    scales = strength_sizes()[:, None]
+    parts = np.zeros((len(scales), count))
     for size, power in zip(sizes, powers, strict=True):
-        for part, scale in zip(parts, strength_sizes(), strict=True):
-            part += 0.5 * power / level / (size + scale**-2) - 0.5 * width * np.log1p(
-                scale**2 * size
-            )
-    return np.asarray(log_sum(parts) - np.log(len(strength_sizes())))
+        parts += 0.5 * power / level / (size + scales**-2)
+        parts -= 0.5 * width * np.log1p(scales**2 * size)
+    return np.asarray(log_sum(parts) - np.log(len(scales)))
 
 
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
@@ -135,10 +129,9 @@ def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[F
         for axis in lines.AXES:
             every = lines.frequencies(stack, channel, axis)
             searched.append(waves(stack, noise, channel, axis, every, acting))
-            at = places(stack, channel, axis)
-            searched.append(steps(stack, noise, channel, axis, at, acting))
+            searched.append(steps(stack, noise, channel, axis, acting))
 
-    return tuple(family for family in searched if family.blocks and family.at.size)
+    return tuple(family for family in searched if family.blocks)
 
 
 def more_families(stack: Stack, noise: Noise) -> tuple[Family, ...]:
@@ -148,24 +141,18 @@ def more_families(stack: Stack, noise: Noise) -> tuple[Family, ...]:
         turning = orders_shown(stack, 1.0) / (2.0 * np.pi)
         searched.append(waves(stack, noise, channel, "wheel_angle", turning, stack.new))
         for axis in ("slip", "run") if "slip" in known else ("run",):
-            at = places(stack, channel, axis)
-            searched.append(steps(stack, noise, channel, axis, at, stack.new))
+            searched.append(steps(stack, noise, channel, axis, stack.new))
 
-    return tuple(family for family in searched if family.blocks and family.at.size)
+    return tuple(family for family in searched if family.blocks)
 
 
 def waves(
-    stack: Stack,
-    noise: Noise,
-    channel: str,
-    axis: str,
-    frequencies: Array,
-    acting: Bools | None = None,
+    stack: Stack, noise: Noise, channel: str, axis: str, frequencies: Array, acting: Bools
 ) -> Family:
-    """Waves of some frequencies (f,) [1/s, 1/m]."""
+    """Waves of some frequencies (f,) [1/s, 1/m] on the values (N,) where they may act."""
     size, x = np.sqrt(2.0) * size_of(stack, channel), stack.covariate(axis)
     blocks = []
-    stretches = _stretches(stack, channel, stack.new if acting is None else acting)
+    stretches = _stretches(stack, channel, acting)
     for index in stretches if frequencies.size else ():
         rows = noise.touched(int(index[0]), int(index[-1]) + 1)
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
@@ -181,16 +168,9 @@ def _stretches(stack: Stack, channel: str, acting: Bools) -> list[Index]:
     return [index for index in lines.stretches(stack, channel) if acting[index[0]]]
 
 
-def steps(
-    stack: Stack,
-    noise: Noise,
-    channel: str,
-    axis: str,
-    at: Array,
-    acting: Bools | None = None,
-) -> Family:
-    """Steps at some places (f,) [s, m]."""
-    shape = Shape(channel, (axis,), "step")
+def steps(stack: Stack, noise: Noise, channel: str, axis: str, acting: Bools) -> Family:
+    """Steps wherever there may be one, on the values (N,) where they may act."""
+    shape, at = Shape(channel, (axis,), "step"), places(stack, channel, axis)
     if not at.size:
         return Family(shape, at, ())
     rows = _rows(stack.of(channel))
@@ -210,20 +190,15 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     if axis == "run":
         return np.arange(x.min(), x.max()) + 0.5
 
-    ordered = np.sort(x)
-    beyond = np.unique(
-        np.linspace(
-            TUNING.noise.cell_values, x.size - TUNING.noise.cell_values, TUNING.screen.step_places
-        ).astype(int)
-    )
-
+    ordered, least = np.sort(x), TUNING.noise.cell_values
+    beyond = np.linspace(least, x.size - least, TUNING.screen.step_places).astype(int)
     return np.unique(0.5 * (ordered[beyond - 1] + ordered[beyond]))
 
 
-def _risen(stack: Stack, rows: slice, axis: str, at: Array, acting: Bools | None = None) -> Array:
+def _risen(stack: Stack, rows: slice, axis: str, at: Array, acting: Bools) -> Array:
     """(n, p) from 0 to 1 at each place while the wheel moves, on the values that may act."""
     x, moving = stack.covariate(axis)[rows], (stack.covariate("speed") > 0.0)[rows]
-    where = (moving & (stack.new if acting is None else acting)[rows])[:, None]
+    where = (moving & acting[rows])[:, None]
     span = {"time": TUNING.noise.stretch, "run": 1.0}.get(axis) or float(np.ptp(x[moving]))
     width = TUNING.screen.step_width * span
     return np.asarray(np.where(where, 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0))
@@ -253,9 +228,9 @@ def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Sig
     every = family.evidence(beside)
     share = -float(np.log(every.size))
     best = every.max(axis=0)
-    edge = np.full(1, -np.inf)
-    before, after = np.concatenate((edge, best[:-1])), np.concatenate((best[1:], edge))
-    top = np.flatnonzero((best >= before) & (best > after) & (best + share > 0.0))
+    edged = np.pad(best, 1, constant_values=-np.inf)
+    highest = (best >= edged[:-2]) & (best > edged[2:])
+    top = np.flatnonzero(highest & (best + share > 0.0))
 
     for place in top[np.argsort(-best[top])][: TUNING.search.again]:
         shared = family.phases[int(np.argmax(every[:, place]))]
@@ -289,11 +264,12 @@ def _refined(
     family: Family, problem: Problem, beside: Projection, place: int, shared: bool
 ) -> float:
     """The best frequency between two of the scan."""
-    near = family.at[place] + np.linspace(-1.0, 1.0, TUNING.numerics.frequencies_near_best) * (
-        family.at[1] - family.at[0] if family.at.size > 1 else 0.0
-    )
-    finer = waves(problem.stack, problem.noise, family.shape.channel, family.axis, near)
-    return float(near[int(np.argmax(finer.in_phase(beside, shared)))])
+    steps_near = np.linspace(-1.0, 1.0, TUNING.numerics.frequencies_near_best)
+    near = family.at[place] + float(np.ptp(family.at[:2])) * steps_near
+    stack = problem.stack
+    finer = waves(stack, problem.noise, family.shape.channel, family.axis, near, stack.new)
+    best = finer.evidence(beside)[finer.phases.index(shared)]
+    return float(near[int(np.argmax(best))])
 
 
 def _signature(stack: Stack, shape: Shape, prior: float) -> Signature:
@@ -310,7 +286,7 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
     size = size_of(stack, shape.channel)
     if shape.kind != "wave":
         rows, out = _rows(stack.of(shape.channel)), np.zeros((stack.size, 1))
-        risen = size * _risen(stack, rows, axis, np.array(shape.places))
+        risen = size * _risen(stack, rows, axis, np.array(shape.places), stack.new)
         out[rows] = risen[:, :1] - risen[:, 1:].sum(axis=1, keepdims=True)
         return out
 

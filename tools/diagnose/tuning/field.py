@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import field
-from types import MappingProxyType
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -17,5 +16,5 @@ def tuned(value: T, unit: str, reason: str, learnt: str = JUDGEMENT) -> T:
     unit: "share" and "probability" are halved and doubled in their odds, "quantile" in the odds of
     its tail; "prior" and "choice" are not halved.
     """
-    about = MappingProxyType({"unit": unit, "reason": reason, "learnt": learnt})
+    about = {"unit": unit, "reason": reason, "learnt": learnt}
     return field(default_factory=lambda: value, metadata=about)

@@ -50,8 +50,6 @@ class FitTuning:
         (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
     )
 
-    # --- descent.py ---
-
     # --- discrepancy.py ---
     form_sizes: tuple[float, ...] = tuned(
         FORM_SIZES, "-", "of a channel's size: what a model of a wheel in soil misses", PUBLISHED
@@ -111,8 +109,6 @@ class FitTuning:
     strength_prior: float = tuned(
         3.0, "-", "a strength's prior standard deviation, in expected sizes"
     )
-
-    # --- projection.py ---
 
     # --- shared.py: what the reference shows already ---
     shared_sizes: tuple[float, ...] = tuned(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.tools.diagnose.explain.reconciled import reconciled
+from gritd.tools.diagnose.explain.soil import reconciled
 
 MEANS = st.floats(-8.0, 8.0)
 SIGMAS = st.floats(0.01, 0.99)

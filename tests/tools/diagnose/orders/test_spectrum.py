@@ -8,9 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.tools.diagnose.orders.lines import find_lines
-from gritd.tools.diagnose.orders.spectrum import Spectrum, log_chance, places_of, spectrum
+from gritd.tools.diagnose.orders.spectrum import (
+    Spectrum,
+    fourier_sums,
+    log_chance,
+    places_of,
+    spectrum,
+)
 from gritd.tools.diagnose.orders.stretches import Samples
-from gritd.tools.diagnose.orders.transform import fourier_sums
 from gritd.tools.diagnose.orders.wave import amplitude_of
 from gritd.tools.diagnose.tuning import replaced
 from tests.tools.diagnose.orders.made import campaign, readings, red

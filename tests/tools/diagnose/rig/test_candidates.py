@@ -11,7 +11,6 @@ from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.fit.signatures import highest_order
-from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
@@ -37,7 +36,7 @@ def test_short_runs_at_steady_speeds_are_no_table(driven: list[Signals]) -> None
     """They have times, places and wheel angles, so what goes with these may be what is left out."""
     short = [_steady(run) for run in driven]
     assert all(np.ptp(run.wheel_angle) < 2.0 * np.pi for run in short)
-    listed = candidates(short, ())
+    listed = wheel_rig(short, settings()).effects
     assert {"bed_inclination", "soil_patch", "gear_ripple"} <= listed.keys()
 
 
@@ -45,7 +44,8 @@ def _steady(run: Signals) -> Signals:
     """Two seconds of a run at one speed."""
     at = slice(30, 50)
     names = ("time", "wheel_angle", "wheel_speed", "carriage_angle", "carriage_rate", "doubt")
-    return replace(run, **{name: getattr(run, name)[at] for name in names})
+    analogue = {name: values[at] for name, values in run.analogue.items()}
+    return replace(run, analogue=analogue, **{name: getattr(run, name)[at] for name in names})
 
 
 def test_the_scatter_of_a_table_is_no_sensors(driven: list[Signals]) -> None:
@@ -55,16 +55,17 @@ def test_the_scatter_of_a_table_is_no_sensors(driven: list[Signals]) -> None:
 
 
 def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:
-    assert not tables(driven)
-    listed = candidates(driven, ("empirical_law",))
+    rig = wheel_rig(driven, settings())
+    listed = rig.effects
+    assert not rig.tabled
     assert listed.keys() == {n for n, e in EFFECTS.items() if not e.filter_only} - {"empirical_law"}
     assert all(listed[name] is EFFECTS[name] for name in listed)
 
 
 def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[Signals]) -> None:
-    table = [tabled(run) for run in driven]
-    assert tables(table)
-    left = candidates(table, ())
+    rig = wheel_rig([tabled(run) for run in driven], settings())
+    left = rig.effects
+    assert rig.tabled
     gone = {"gear_ripple", "hub_runout", "soil_patch", "motor_heating", "contact_relaxation"}
     assert not gone & left.keys()
     assert {"slip_sinkage", "bulldozing", "coulomb_friction", "rim_friction"} <= left.keys()

@@ -64,10 +64,8 @@ def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None
     first, *others = (m.fitted for m in rivals)
     one, each = (first.u, first.acting), [(m.u, m.acting) for m in others]
     gains = {k: _gains(search, k, one, each) for k in rig.words.menu.driven}
-    told = {}
-    for key, of in gains.items():
-        pairs = zip(rivals[1:], of, strict=True)
-        told[key] = [rival for rival, nats in pairs if nats >= TUNING.screen.sure]
+    pairs = {key: zip(rivals[1:], of, strict=True) for key, of in gains.items()}
+    told = {key: [r for r, nats in of if nats >= TUNING.screen.sure] for key, of in pairs.items()}
 
     best = max(told, key=lambda k: len(told[k]), default="")
     if best and told[best]:

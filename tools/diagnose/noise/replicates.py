@@ -187,9 +187,7 @@ def _terms(stack: Stack) -> Array:
     """Pass, start and campaign of each run (runs, 3): on other terms a repetition is no
     replicate.
     """
-    rows: list[tuple[float, float, float]] = []
-    for run in stack.rig.runs:
-        passes = run.covariates.get("pass", np.zeros(1))
-        start = float(run.covariates["position"][0])
-        rows.append((float(passes[0]), start, float(stack.rig.new[len(rows)])))
-    return np.array(rows)
+    known = [run.covariates for run in stack.rig.runs]
+    passes = [of["pass"][0] if "pass" in of else 0.0 for of in known]
+    starts = [of["position"][0] for of in known]
+    return np.column_stack((passes, starts, np.array(stack.rig.new, dtype=float)))

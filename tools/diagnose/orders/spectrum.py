@@ -58,11 +58,6 @@ class Places:
     spacing: float
     count: int
 
-    @property
-    def at(self) -> Array:
-        """(o,)."""
-        return np.asarray(self.spacing * np.arange(self.count), dtype=float)
-
 
 def places_of(parts: Sequence[Samples], axis: str) -> Places:
     """As dense as the longest part resolves, up to the fastest ripple that some part shows."""

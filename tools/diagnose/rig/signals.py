@@ -36,7 +36,6 @@ class Signals:
     """One recording on its grid; arrays (n,), NaN where there is nothing. SI, calibrated."""
 
     name: str
-    path: Path
     info: RunInfo
     start: float  # [s since the epoch] of time 0
     time: Array  # [s] middle of each interval
@@ -49,7 +48,6 @@ class Signals:
     doubt: Array
     # sinkage, current, temperature, drawbar_pull, side_force, load, axle_torque; those there are
     analogue: dict[str, Array]
-    damage: tuple[str, ...]
     left_out: str = ""  # what of the recording is not used, in words
 
 
@@ -99,17 +97,15 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
     """SHA-256 of every file. Raises CommandError where two are the same: a run counted twice would
     prove nothing.
     """
-    checksums: dict[str, str] = {}
+    seen: dict[str, Path] = {}
     for path in paths:
         checksum = sha256(path)
-        if checksum in checksums.values():
-            first = next(name for name, value in checksums.items() if value == checksum)
-            raise CommandError(
-                f"{path}: found the same recording as {first}; expected each run once", USAGE
-            )
-        checksums[str(path)] = checksum
+        if checksum in seen:
+            same = f"found the same recording as {seen[checksum]}"
+            raise CommandError(f"{path}: {same}; expected each run once", USAGE)
+        seen[checksum] = path
 
-    return checksums
+    return {str(path): checksum for checksum, path in seen.items()}
 
 
 def in_order(paths: Sequence[Path]) -> list[Path]:
@@ -156,7 +152,6 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
 
     return Signals(
         recording.run.name or recording.path.stem,
-        recording.path,
         recording.run,
         float(edges[0]),
         0.5 * (edges[1:] + edges[:-1]) - edges[0],
@@ -164,7 +159,6 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         *carriage[:2],
         doubt(wheel, carriage),
         {name: values for name, values in analogue.items() if np.isfinite(values).any()},
-        tuple(recording.damage),
         left_out,
     )
 

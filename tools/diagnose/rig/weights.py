@@ -76,9 +76,8 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
     measured, wrench = signals.analogue.get("load"), settings.wrench
     if measured is None or wrench is None:
         return None
-    if wrench.load.offset.sigma > TUNING.rig.unknown_offset:
-        return None
-    if np.mean(np.isfinite(measured)) < 0.5:
+    silent = np.mean(np.isfinite(measured)) < 0.5
+    if silent or wrench.load.offset.sigma > TUNING.rig.unknown_offset:
         return None
 
     load = filled(measured)

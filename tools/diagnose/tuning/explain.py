@@ -27,7 +27,7 @@ class Explain:
     shown: int = tuned(4, "lines, runs, or scatters", "that are shown of many")
 
     # --- soil.py ---
-    stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off", "judgement")
+    stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off")
     precision_freedom: float = tuned(
         4.0, "-", "independent conditions from which the recordings' own σ is known, about"
     )

@@ -39,13 +39,13 @@ class FitTuning:
         (0.0, 0.1, 0.3), "-", "shares of an effect that vary along the bed"
     )
     place_prior: tuple[float, ...] = tuned(
-        (0.8, 0.1, 0.1), "prior", "probability of each of the sizes", "judgement"
+        (0.8, 0.1, 0.1), "prior", "probability of each of the sizes"
     )
 
     free_zero_sizes: tuple[float, ...] = tuned(
         (0.0, 0.1, 0.5, 2.0), "-", "of an effect, over what no law says how it goes"
     )
-    harmonics: int = tuned(4, "-", "of a ripple that it may have besides", "judgement")
+    harmonics: int = tuned(4, "-", "of a ripple that it may have besides")
     following_arcs: tuple[float, ...] = tuned(
         (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
     )
@@ -66,7 +66,6 @@ class FitTuning:
         180,
         "features",
         "of a source at most, with a reference campaign: it follows every transient that both have",
-        "judgement",
     )
     form_left_out: float = tuned(3e-3, "-", "variance of the discrepancy that may be left out")
     form_apart: int = tuned(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -261,7 +260,6 @@ def _recorded(
     middle = 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     signals = Signals(
         info.name,
-        Path(f"{info.name}.mcap"),
         info,
         float(edges[0]),
         middle,
@@ -269,7 +267,6 @@ def _recorded(
         *carriage[:2],
         doubt(wheel, carriage),
         analogue,
-        (),
     )
     return signals, {"wheel_encoder": (time, angle), **read}
 

@@ -87,7 +87,7 @@ def test_a_ripple_of_the_reference_goes_on_with_its_exact_order() -> None:
     smooth = Stack(wheel_rig([*record(still, ())] * 2, settings(), 3, "same", lines=rig.lines))
     residual = stack.measured - smooth.measured
     torque = stack.of("torque") & (stack.covariate("speed") > 0.0)
-    columns, rippling = rippling_columns(stack, residual)[torque], residual[torque]
+    columns, rippling = rippling_columns(stack)[torque], residual[torque]
     left = rippling - columns @ np.linalg.lstsq(columns, rippling, rcond=None)[0]
     assert np.std(left) < 0.1 * np.std(rippling)
 

@@ -57,6 +57,15 @@ class Columns:
         blocks = [(rows, np.where(marked[rows, None], own, 0.0)) for rows, own in self.blocks]
         return replace(self, blocks=tuple(blocks))
 
+    def among(self, marked: Bools) -> Columns:
+        """On the marked values (N,) alone, one after the other."""
+        before = np.concatenate(([0], np.cumsum(marked)))
+        blocks = tuple(
+            (slice(int(before[rows.start]), int(before[rows.stop])), own[marked[rows]])
+            for rows, own in self.blocks
+        )
+        return Columns(int(before[-1]), blocks)
+
     def times(self, weights: Array) -> Array:
         """What weights (m,) amount to (N,)."""
         out = np.zeros(self.size)
@@ -78,6 +87,17 @@ class Columns:
         """(m, k) with other columns (N, k)."""
         parts = [np.zeros((self.count, 0))]
         return np.hstack([*parts, *(self.pulled(own, rows.start) for rows, own in other.blocks)])
+
+    @property
+    def gram(self) -> Array:
+        """Products (m, m) with one another."""
+        out = np.zeros((self.count, self.count))
+        for number, place in enumerate(self._places):
+            rows, own = self.blocks[number]
+            before = replace(self, blocks=self.blocks[: number + 1]).pulled(own, rows.start)
+            out[: place.stop, place] = before
+            out[place, : place.stop] = before.T
+        return out
 
 
 def joined(size: int, parts: Sequence[Columns]) -> Columns:

@@ -2,8 +2,8 @@
 to the rest.
 
 Around its optimum a model is linear in its unknowns, so a fit without some values is linear algebra
-on the Jacobian at
-hand: no further evaluation of the physics. Repeats of one manoeuvre in the same fold cannot leak.
+on the Jacobian at hand: no further evaluation of the physics. Repeats of one manoeuvre in the same
+fold cannot leak.
 """
 
 from __future__ import annotations
@@ -95,14 +95,12 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     density, predicted = [], fitted.predicted.copy()
 
     for fold in folds:
-        inside = j.of_rows(fold)
-        others = gram - inside.products(inside)
+        inside, left = j.among(fold), r[fold]
+        others = gram - inside.gram
         less = cholesky(others, lower=True, overwrite_a=True, check_finite=False)
-        step = cho_solve((less, True), score - inside.pulled(r), check_finite=False)
-        moved = fitted.predicted + fitted.raw @ step[:size] + own.times(step[last:])
-        predicted[fold] = moved[fold]
-        error = np.where(fold, r - inside.times(step), 0.0)
-        density.append(_log_density(error, inside, joint, less))
+        step = cho_solve((less, True), score - inside.pulled(left), check_finite=False)
+        predicted[fold] += fitted.raw[fold] @ step[:size] + own.among(fold).times(step[last:])
+        density.append(_log_density(left - inside.times(step), inside, joint, less))
     return HeldOut(np.array(density), predicted)
 
 

@@ -42,7 +42,7 @@ class Projection:
     def __init__(self, jacobian: Columns, residual: Array, strain: Array) -> None:
         """jacobian (N, q) and residual (N,) whitened; strain (q,) the unknowns in prior σ."""
         self.jacobian, self.residual, self.strain = jacobian, residual, strain
-        self._root = np.linalg.cholesky(jacobian.products(jacobian) + np.eye(jacobian.count))
+        self._root = np.linalg.cholesky(jacobian.gram + np.eye(jacobian.count))
         self._pulled = self._solved(jacobian.pulled(residual) - strain)
 
     def with_columns(self, columns: Array) -> Projection:

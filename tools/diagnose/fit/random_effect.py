@@ -92,5 +92,5 @@ _formed: WeakKeyDictionary[RandomEffect, WeakKeyDictionary[RandomEffect, Array]]
 def _between(a: RandomEffect, b: RandomEffect) -> Array:
     known = _formed.setdefault(a, WeakKeyDictionary())
     if b not in known:
-        known[b] = a.whitened.products(b.whitened)
+        known[b] = a.whitened.gram if a is b else a.whitened.products(b.whitened)
     return known[b]

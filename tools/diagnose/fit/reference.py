@@ -38,23 +38,17 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
     """
     stack = rough.problem.stack
     shared = shared_columns(stack, rough.fitted.u, rough.fitted.predicted)
+    ripples = rippling_columns(stack)
+    noise = _least_noise(rough, shared, ripples)
+    first = _of_reference(rough, noise, shared, ripples)
+
     none = np.zeros((stack.size, 0))
-    noise = _least_noise(rough, shared, none)
-    first = _of_reference(rough, noise, shared, none)
-
-    ripples = rippling_columns(stack, left(first))
-    again = first
-    if ripples.shape[1]:
-        noise = _least_noise(rough, shared, ripples)
-        again = _of_reference(first, noise, shared, ripples)
-
-    nothing = Explainable(none, none)
-    predicted = again.fitted.predicted
-    calm = without_ripples(stack, left(again), ripples)
-    alone = estimate_of_reference(stack, predicted, left(again), calm, nothing, noise)
+    predicted, over = first.fitted.predicted, left(first)
+    calm = without_ripples(stack, over, ripples)
+    alone = estimate_of_reference(stack, predicted, over, calm, Explainable(none, none), noise)
     noise = restless(louder(noise, alone), calm)
 
-    usual = _of_reference(again, noise, shared, ripples)
+    usual = _of_reference(first, noise, shared, ripples)
     more = shared_terms(noise, shared, ripples)
     sizes = usual.model.sizes
     return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)

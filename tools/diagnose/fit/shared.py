@@ -11,21 +11,26 @@ linear about the rough fit, reduced to the directions that the recordings can sh
 soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
 says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
 keeps its order and its size, but not its phase: each run has its own. A run of larger forces or
-torques may ripple more in proportion, as a gear does. What a run begins with, before soil is
-sheared and heaped under a wheel that was set down, is another in each run too.
+torques may ripple more in proportion, as a gear does. Soil and rim forget over a length of travel:
+what a channel lacks where it follows the prediction is a sum over lengths a factor of three apart,
+as any memory that fades nearly is. What a run begins with, before soil is sheared and heaped under
+a wheel that was set down, is another in each run too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, order_of
-from gritd.estimator.model.discrepancy import CONDITIONS, START
+from gritd.estimator.model.discrepancy import CONDITIONS, START, TRAVELS
+from gritd.estimator.stages.history import followed
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, scale_of
+from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, joined, scale_of
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
@@ -39,6 +44,7 @@ from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 CHANGES = "changes"  # what varies with time, heat, place or run
 STARTS = "starts"  # what a run begins with
+MEMORY = "memory"  # of what was a while ago
 # what all other effects are of, and their stages
 PARTS = {
     CHANGES: (),
@@ -59,8 +65,39 @@ def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]
         own = columns[_part_of(stack.rig.effects[name])]
         own += [s.columns / np.sqrt(len(every)) for s in every]
     return {part: np.column_stack(each) for part, each in columns.items()} | {
-        STARTS: _starts(stack)
+        STARTS: _starts(stack),
+        MEMORY: _memory(stack, predicted),
     }
+
+
+def _memory(stack: Stack, predicted: Array) -> Array:
+    """What each channel lacks where it follows a prediction (N,) over lengths of the rim's or the
+    axle's way, in m or in contact lengths (N, m).
+    """
+    direction, columns = stack.covariate("direction"), [np.zeros((stack.size, 0))]
+    for source in (source for source in stack.rig.forms if not source.drive):
+        ways = [joined(stack, [run[:, k] for run in source.ways]) for k in range(4)]
+        for channel, way, length in product(source.channels, ways, TRAVELS):
+            own = np.flatnonzero(stack.of(channel))
+            share = -np.expm1(-np.abs(np.diff(way[own], prepend=0.0)) / length)
+            follow = partial(followed, share=share, run=stack.run[own].astype(float))
+            turn = direction[own] if source.signed else None
+            behind = np.zeros((stack.size, 2 if source.signed else 1))
+            behind[own] = _behind(predicted[own], turn, follow)
+            columns.append(behind)
+    return np.column_stack(columns)
+
+
+def _behind(values: Array, turn: Array | None, follow: Callable[[Array], Array]) -> Array:
+    """What values (n,) lack where they follow themselves (n, k). With a direction (n,) that they
+    turn with: as they are, and in a size that lasts through rest and reversal.
+    """
+    if turn is None:
+        return (follow(values) - values)[:, None]
+    moving = np.abs(turn)
+    return np.column_stack(
+        (moving * (follow(values) - values), turn * follow(turn * values) - moving * values)
+    )
 
 
 def _starts(stack: Stack) -> Array:
@@ -80,22 +117,24 @@ def _part_of(effect: type[Effect]) -> str:
     return next(part for part, stages in PARTS.items() if effect.stage in stages)
 
 
-def rippling_columns(stack: Stack, residual: Array) -> Array:
+def rippling_columns(stack: Stack) -> Array:
     """Cosine and sine (N, m) of the ripples that the reference's readings show at their own rate,
-    of the size that they have in its residual (N,); of every run and channel its own.
+    of the size that they have there; of every run and channel its own.
     """
-    waves: dict[tuple[int, float], list[tuple[Index, Array]]] = {}
-    for line, index, wave in line_waves(stack, stack.rig.lines.shared):
-        waves.setdefault((int(stack.channel[index[0]]), line.at), []).append((index, wave))
+    lines = stack.rig.lines
+    waves: dict[tuple[int, float], list[tuple[float, Index, Array]]] = {}
+    for line, index, wave in line_waves(stack, lines.shared):
+        of = (int(stack.channel[index[0]]), line.at)
+        waves.setdefault(of, []).append((lines.before(line), index, wave))
 
     columns = [np.zeros((stack.size, 0))]
     for runs in waves.values():
-        known = [(index, wave) for index, wave in runs if not stack.new[index[0]]]
+        known = [index for _, index, _ in runs if not stack.new[index[0]]]
         if known:
-            amplitude, usual = _amplitude(residual, known), _level(stack, known)
-            for one in runs:
+            usual = _level(stack, known)
+            for size, index, wave in runs:
                 own = np.zeros((stack.size, 2))
-                own[one[0]] = amplitude * max(_level(stack, [one]) / usual, 1.0) * one[1]
+                own[index] = size * max(_level(stack, [index]) / usual, 1.0) * wave
                 columns.append(own)
     return np.column_stack(columns)
 
@@ -145,7 +184,7 @@ def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect,
     """The terms with what varies with time, heat, place or run, and what runs begin with, no larger
     than in the reference. Where nothing dried, warmed up or crept then, it is news if it does now.
     """
-    passing = (_name(CHANGES), _name(STARTS))
+    passing = (_name(CHANGES), _name(STARTS), _name(MEMORY))
     return tuple(
         replace(f, sizes=f.sizes.up_to(number)) if f.name in passing else f
         for f, number in zip(terms, sizes, strict=True)
@@ -169,17 +208,7 @@ def _reduced(columns: Array, whitened: Array) -> Array:
     return np.asarray(columns @ vectors[:, large])
 
 
-def _amplitude(residual: Array, runs: Sequence[tuple[Index, Array]]) -> float:
-    """Root mean square over runs, by their values, of a ripple's amplitude in a residual (N,)."""
-    squares, count = 0.0, 0
-    for index, wave in runs:
-        values = residual[index] - residual[index].mean()
-        squares += float(np.sum((values @ wave) ** 2)) / index.size
-        count += index.size
-    return 2.0 * float(np.sqrt(squares / count))
-
-
-def _level(stack: Stack, runs: Sequence[tuple[Index, Array]]) -> float:
+def _level(stack: Stack, parts: Sequence[Index]) -> float:
     """Root mean square of what was measured."""
-    values = np.concatenate([stack.measured[index] for index, _ in runs])
+    values = stack.measured[np.concatenate(parts)]
     return max(float(np.sqrt(np.mean(values**2))), SPAN)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gritd.estimator.effects.contact_relaxation import SHALLOW, USUAL
 from gritd.estimator.model.discrepancy import CARRYING, Usual, conditions_of, weight_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import FormSource, GridRun
@@ -34,13 +35,18 @@ def wheel_forms(
         return ()
 
     conditions = tuple(conditions_in(run, usual, radius) for run in runs)
+    ways = tuple(_ways(run, radius) for run in runs)
     forms = []
     for name, both, signed in SOURCES:
         lost = ("torque",) if driven is not None else ()
         measured = tuple(c for c in both if c in channels and c not in lost)
         if measured:
             weight = tuple(_weight(run, usual, signed) for run in runs)
-            forms.append(FormSource(name, measured, conditions, weight, usual=usual))
+            forms.append(
+                FormSource(
+                    name, measured, conditions, weight, usual=usual, ways=ways, signed=signed
+                )
+            )
 
     if driven is not None:
         weight = tuple(_weight(run, usual, True) for run in runs)
@@ -75,6 +81,16 @@ def conditions_in(run: GridRun, usual: Usual, radius: float) -> Array:
     return conditions_of(
         known["slip"], known["load"], known["speed"], known["direction"], travel, usual
     )
+
+
+def _ways(run: GridRun, radius: float) -> Array:
+    """How far rim and axle have travelled (n, 4): both in m, then in usual contact lengths."""
+    known = run.covariates
+    ways = np.column_stack((radius * known["rolled"], known["position"]))
+    steps = np.abs(np.diff(ways, axis=0, prepend=ways[:1]))
+    cos_theta_1 = np.clip(1.0 - known["sinkage"] / radius, 0.0, 1.0)
+    contact = np.maximum(np.sqrt(1.0 - cos_theta_1**2), SHALLOW) / USUAL
+    return np.cumsum(np.hstack((steps, steps / contact[:, None])), axis=0)
 
 
 def _weight(run: GridRun, usual: Usual, signed: bool) -> Array:

@@ -143,6 +143,9 @@ class FormSource:
     size:       in the unit of its channels; None: the root mean square of its last channel.
     drive:      whether it is the drive's and not the soil's.
     usual:      load and speed that the conditions are counted from, where there is soil.
+    ways:       per run (n, 4), how far rim and axle have travelled where there is soil, in m and in
+        usual contact lengths.
+    signed:     whether its channels turn with the direction of travel.
     """
 
     name: str
@@ -152,6 +155,8 @@ class FormSource:
     size: float | None = None
     drive: bool = False
     usual: Usual | None = None
+    ways: tuple[Array, ...] = ()
+    signed: bool = True
 
     @property
     def count(self) -> int:

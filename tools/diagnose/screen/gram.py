@@ -75,7 +75,7 @@ class Gram:
         self._pulled = _solved(self._root, self._fixed.pulled(self._residual) - strain)
         self._inside = _solved(self._root, self._fixed.products(self._form))
 
-        gram = self._form.products(self._form) - self._inside.T @ self._inside
+        gram = self._form.gram - self._inside.T @ self._inside
         score = self._form.pulled(self._residual) - self._inside.T @ self._pulled
         misfit = self._residual @ self._residual + strain @ strain - self._pulled @ self._pulled
         alone = -0.5 * float(misfit) - float(np.log(np.diag(self._root)).sum())
@@ -178,7 +178,7 @@ def _about(model: Model, forms: Sequence[RandomEffect]) -> list[Chosen]:
 
 def _root(columns: Columns) -> Array:
     """Cholesky root (q, q) of the products of columns (N, q) and their unit prior."""
-    gram = columns.products(columns)
+    gram = columns.gram
     gram[np.diag_indices_from(gram)] += 1.0
     return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 

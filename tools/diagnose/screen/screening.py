@@ -99,7 +99,7 @@ class Screen:
     formed: whether its discrepancy is none of the alarm.
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     strain: [σ] of the constant that stands farthest from what is known of it, and its name.
-    usual:  what so many runs of a reference would raise [nats] (usual.py).
+    usual:  what a run of a reference would raise [nats] (usual.py).
     open:   the largest log Bayes factor of what stands out with the noise's colour open [nats].
     """
 

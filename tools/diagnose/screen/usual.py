@@ -2,8 +2,9 @@
 
 Beside a reference, what is new must be more than a rig that is a little off its model anyway. How
 much that is its own runs show: every run of it is judged as if it alone were new, by the effects
-and functions that the new campaign is judged by, which itself says nothing of it. What so many runs
-show adds up.
+and functions that the new campaign is judged by, which itself says nothing of it. Runs that are off
+each in its own way do not add up: of n runs whose strengths scatter about nought the common one is
+as many σ from it as that of a single run.
 """
 
 from __future__ import annotations
@@ -29,8 +30,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 def usual(problem: Problem, model: Model, first: Pass) -> float:
-    """The largest log likelihood ratio of a run of the reference [nats, 0 at least], times the
-    number of new runs.
+    """The largest log likelihood ratio of a run of the reference [nats, 0 at least].
 
     first: of the effects in the new campaign, whose likeliest shapes are tried.
     """
@@ -38,8 +38,7 @@ def usual(problem: Problem, model: Model, first: Pass) -> float:
     runs = [stack.run == number for number in np.flatnonzero(~np.array(stack.rig.new))]
     effects = _of_effects(problem, model, first, runs)
     smooth = _of_functions(problem, model, runs)
-    largest = float(np.max(np.logaddexp(effects, smooth) - np.log(2.0), initial=0.0))
-    return float(sum(stack.rig.new) * largest)
+    return float(np.max(np.logaddexp(effects, smooth) - np.log(2.0), initial=0.0))
 
 
 def unnamed_in_both(

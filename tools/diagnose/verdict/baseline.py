@@ -29,6 +29,7 @@ from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.search.search import TURNING
@@ -77,7 +78,7 @@ def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...
     if not base.problem.stack.referred:
         return ()
     tried = [
-        (_in_both(base, accepted, accepted.names, (name,)), name)
+        (_in_both(base, accepted, accepted.names, (name,), accepted.fitted), name)
         for name in _not_had(base, accepted.names)
     ]
     found = [(model, name) for model, name in tried if model is not None]
@@ -92,14 +93,24 @@ def _not_had(base: BaseFit, names: Sequence[str]) -> list[str]:
     return [name for name in names if _lasts(rig.effects[name]) and name not in had]
 
 
-def _in_both(base: BaseFit, of: Model, acting: Sequence[str], both: Sequence[str]) -> Model | None:
-    """Some effects of a model fitted, of these some in both campaigns."""
+def _in_both(
+    base: BaseFit,
+    of: Model,
+    acting: Sequence[str],
+    both: Sequence[str],
+    near: Fitted | None = None,
+) -> Model | None:
+    """Some effects of a model fitted, of these some in both campaigns; near: a fit to both, where
+    the constants begin, if not at those of the base.
+    """
     problem = base.problem.in_both(both)
     effects = tuple(e for e, n in zip(of.fitted.effects, of.names, strict=True) if n in acting)
     kept = np.array([free.name in acting for free in of.fitted.free], bool)
     free = tuple(f for f, keep in zip(of.fitted.free, kept, strict=True) if keep)
-    begins, sizes = (base.fitted.u, of.fitted.x[kept]), base.model.sizes
-    return attempted(lambda: fit_model(problem, base.forms, effects, free, begins, sizes))
+    begins, sizes = ((near or base.fitted).u, of.fitted.x[kept]), base.model.sizes
+    return attempted(
+        lambda: fit_model(problem, base.forms, effects, free, begins, sizes, near=near)
+    )
 
 
 def _configured(model: Model, names: Sequence[str]) -> tuple[ConfiguredEffect, ...]:

@@ -36,6 +36,8 @@ def test_blocks_are_the_matrix(one: np.ndarray, other: np.ndarray, begin: int, e
 
     marked = np.arange(11) % 3 > 0
     np.testing.assert_allclose(matrix(b.of_rows(marked)), both * marked[:, None], atol=1e-12)
+    np.testing.assert_array_equal(matrix(b.among(marked)), both[marked])
+    np.testing.assert_allclose(b.among(marked).gram, both[marked].T @ both[marked], atol=1e-12)
     values = np.random.default_rng(1).standard_normal((max(end - begin, 0), 2))
     expected = both[begin : begin + len(values)].T @ values
     np.testing.assert_allclose(b.pulled(values, begin), expected, atol=1e-12)

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from gritd.estimator.effects import make
+from gritd.estimator.stages.history import followed
+from gritd.tools.diagnose.fit.discrepancy import joined
 from gritd.tools.diagnose.fit.shared import (
     _reduced,
     rippling_columns,
@@ -36,8 +38,7 @@ def _columns(acting: tuple[Any, ...], seed: int, seconds: float = 60.0) -> tuple
     before, after = (plan(seed=s, seconds=seconds, standstill=False) for s in (seed, seed + 1))
     reference = record_fully(before, acting)
     stack = Stack(rig_of(after, acting, reference, "same"))
-    smooth = Stack(rig_of(after, (), record_fully(before, ()), "same"))
-    return stack, rippling_columns(stack, stack.measured - smooth.measured)
+    return stack, rippling_columns(stack)
 
 
 def _ripple(order: float, size: float = 0.3) -> Any:
@@ -87,7 +88,7 @@ def test_every_listed_effect_but_ripples_may_act_in_both_in_one_part() -> None:
     stack, _ = _columns((), 7, seconds=20.0)
     u = np.zeros(len(stack.rig.constants))
     shared = shared_columns(stack, u, stack.predict(u))
-    assert list(shared) == ["changes", "drive", "soil", "instruments", "starts"]
+    assert list(shared) == ["changes", "drive", "soil", "instruments", "starts", "memory"]
     assert all(columns.shape[1] for columns in shared.values())
 
     drive, torque = np.abs(shared["drive"]), stack.of("torque")  # friction is in the motor's alone
@@ -104,3 +105,33 @@ def test_what_a_run_begins_with_is_that_runs_alone_and_fades() -> None:
     of_pull = starts[first].max(axis=1)
     driven = of_pull[of_pull > 0.0]
     assert driven[-1] < 0.1 * driven[0]
+
+
+@pytest.mark.parametrize("law", ["two lags", "mean"])
+def test_other_laws_of_memory_are_nearly_a_sum_of_lags(law: str) -> None:
+    """Two lags of 15 mm of the axle's way one after the other, or a mean over its last 40 mm."""
+    stack, _ = _columns((), 7, seconds=20.0)
+    u = np.zeros(len(stack.rig.constants))
+    predicted = stack.predict(u)
+    memory = shared_columns(stack, u, predicted)["memory"]
+    (source,) = (s for s in stack.rig.forms if s.name == "drawbar_pull")
+    way, follows = joined(stack, [w[:, 1] for w in source.ways]), np.zeros(stack.size)
+    for number in range(len(stack.rig.runs)):
+        own = stack.of("drawbar_pull") & (stack.run == number)
+        follows[own] = (_twice if law == "two lags" else _mean)(predicted[own], way[own])
+
+    lack = follows - np.where(stack.of("drawbar_pull"), predicted, 0.0)
+    left = lack - memory @ np.linalg.lstsq(memory, lack, rcond=1e-6)[0]
+    assert np.std(left) < 0.2 * np.std(lack)
+
+
+def _twice(values: np.ndarray, way: np.ndarray) -> np.ndarray:
+    share = -np.expm1(-np.diff(way, prepend=way[0]) / 0.015)
+    return followed(followed(values, share), share)
+
+
+def _mean(values: np.ndarray, way: np.ndarray) -> np.ndarray:
+    total = np.concatenate(([0.0], np.cumsum(values[1:] * np.diff(way))))
+    before = np.interp(way - 0.04, way, total, left=0.0)
+    length = np.minimum(way - way[0], 0.04)
+    return np.where(length > 0.0, (total - before) / np.maximum(length, 1e-9), values)

@@ -43,8 +43,8 @@ def _outside(stack: Stack) -> str:
         low, high, share = float(known.min()), float(known.max()), TUNING.explain.beyond
         room = share * max(high - low, share * abs(float(np.mean(known))))
 
-        above = asked > high + room, high, "above"
-        for beyond, end, word in (above, (asked < low - room, low, "below")):
+        ends = (asked > high + room, high, "above"), (asked < low - room, low, "below")
+        for beyond, end, word in ends:
             if (part := float(np.mean(beyond))) > share:
                 parts.append(f"{percent(part)} {word} {value_of(stack, name, end)}")
 

@@ -93,8 +93,8 @@ def own_columns(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Arr
             shapes[own] = sigma * _shapes(stack.time[own]) if own.any() else 0.0
             columns += list(shapes[:, : None if _one_condition(own, label) else 1].T)
 
-    used = [column for column in columns if column.any()]
-    return np.column_stack(used) if used else np.zeros((stack.size, 0))
+    used = (column for column in columns if column.any())
+    return np.column_stack([np.zeros((stack.size, 0)), *used])
 
 
 def between_runs(held: list[HeldCondition], terms: Array) -> Array:

@@ -249,10 +249,10 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[SpectralLine, ...
             break
         chance, first, axis, place = best
         at = first.refined(axis, place)
+        own = chance + np.log(tried)
         support = sum(channel.support(axis, at) for channel in channels)
         for channel in (first, *(c for c in channels if c is not first)):
-            beside = channel.near(axis, at) + np.log(len(channels))
-            log_p = chance + np.log(tried) if channel is first else beside
+            log_p = own if channel is first else channel.near(axis, at) + np.log(len(channels))
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
                 lines += [line, *_overtones(channel, line, len(runs))]

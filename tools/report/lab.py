@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -22,20 +21,18 @@ from gritd.estimator.model.forward import Carried, carried_at, felt
 from gritd.estimator.offline.bed_runs import BedRun, bed_runs
 from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.recording.cdr import Rows
-from gritd.estimator.recording.recording import Recording
 from gritd.estimator.stages.situation import Motion, Reaction
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.original import OriginalForces
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.cli.wording import NOTHING, fixed
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.rig.signals import is_drive, read_all
+from gritd.tools.diagnose.rig.signals import is_drive, read_all, sha256
 from gritd.tools.recordings.summary import RunSummary, summary
 from gritd.tools.report import front, masthead
 
 NS = 1e-9
 UNDATED = 978_307_200_000_000_000  # [ns] 2001: files that do not say when begin before
-PIECE = 1 << 20  # [bytes] that are hashed at once
 ANOTHER_LOAD = 0.05  # relative gap between the windows of two loads
 FEWEST = 5  # windows of a load
 CHANNELS = ("torque", "drawbar_pull")
@@ -119,18 +116,11 @@ def lab_runs(runs: Sequence[BedRun]) -> list[LabRun]:
     """The runs of a bed, their equations at what all of them know of its soil."""
     final = runs[-1].known.estimate
     return [
-        LabRun(run, summary([run.recording]), sha256(run.recording), measured_windows(run, final))
+        LabRun(
+            run, summary([run.recording]), sha256(run.recording.path), measured_windows(run, final)
+        )
         for run in runs
     ]
-
-
-def sha256(recording: Recording) -> str:
-    """Of the file."""
-    digest = hashlib.sha256()
-    with recording.path.open("rb") as file:
-        while piece := file.read(PIECE):
-            digest.update(piece)
-    return digest.hexdigest()
 
 
 def measured_windows(run: BedRun, estimate: Estimate) -> MeasuredWindows | None:

@@ -70,11 +70,6 @@ class Pass:
         """The same beyond that of the fit alone [nats]."""
         return self.evidence(name) - self.alone
 
-    @property
-    def ranked(self) -> list[str]:
-        """Effects, the likeliest first."""
-        return sorted(self.effects, key=lambda name: -self.gain(name))
-
 
 Shapes = Mapping[str, Sequence[Mapping[str, float]]]
 

@@ -31,7 +31,6 @@ from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import HAD, Rig
-from gritd.tools.diagnose.search.calibration import learnt
 from gritd.tools.diagnose.search.search import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
@@ -65,10 +64,7 @@ def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[Config
     found = _in_both(base, largest.model, names, names)
     if found is None or without is None:
         return ()
-    gain, count = np.array([found.evidence - without.evidence]), np.array([len(names)])
-    by = learnt(len(base.problem.stack.rig.effects))
-    likelier = by.weights(gain, count, np.zeros(1))[0] > 0.0
-    return _configured(found, names) if likelier else ()
+    return _configured(found, names) if found.evidence >= without.evidence else ()
 
 
 def shown_as_well(base: BaseFit, accepted: Model) -> tuple[ConfiguredEffect, ...]:

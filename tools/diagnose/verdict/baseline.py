@@ -8,7 +8,7 @@ is first searched as any campaign is, and the effects found act in both campaign
 that both tell.
 
 What explains the reference with the largest evidence, but is not told from others there or only
-resembles what is there, acts in both too where both campaigns are likelier with it. So does an
+resembles what is there, acts in both too where both campaigns are no less likely with it. So does an
 effect accepted as new that explains them no worse in both: the reference shows it, and was only too
 short or too steady to tell it alone.
 
@@ -52,7 +52,7 @@ def baseline_effects(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ..
 
 def shown_unsurely(base: BaseFit, of_reference: Decision | None) -> tuple[ConfiguredEffect, ...]:
     """The lasting effects of the explanation of a reference with the largest evidence, whether they
-    are there or resembled, if both campaigns are likelier with them; as fitted to both.
+    are there or resembled, if both campaigns are no less likely with them; as fitted to both.
     of_reference: None where there is none.
     """
     named = [w for w in of_reference.weighed if w.names] if of_reference else []

@@ -8,9 +8,9 @@ is first searched as any campaign is, and the effects found act in both campaign
 that both tell.
 
 What explains the reference with the largest evidence, but is not told from others there or only
-resembles what is there, acts in both too where both campaigns are no less likely with it. So does an
-effect accepted as new that explains them no worse in both: the reference shows it, and was only too
-short or too steady to tell it alone.
+resembles what is there, acts in both too where both campaigns are no less likely with it. So does
+an effect accepted as new that explains them no worse in both: the reference shows it, and was only
+too short or too steady to tell it alone.
 
 An effect that goes with time, heat, place or run may be another one a day later, what a run begins
 with is another in each, and a ripple has another phase in each: those stay with the terms of

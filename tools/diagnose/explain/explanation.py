@@ -121,11 +121,13 @@ def _hypotheses(
 ) -> tuple[Hypothesis, ...]:
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
+    resembled = {of.name: of.model for of in decision.resembled}
     out = []
     for name, probability in _ranked(search, decision):
         models = [m for m in search.models if name in m.names]
+        likeliest = max(models, key=lambda m: m.evidence, default=None)
         accepted = decision.verdict == "explained" and name in decision.best.names
-        best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
+        best = decision.best if accepted else resembled.get(name, likeliest)
         alike = _alike(decision, name)
         forms = best.form_share(name) if best else 0.0
         rig = search.problem.stack.rig

@@ -125,7 +125,7 @@ def judged(
         _groups(every, named if named.names else best.model),
         every,
         tuple(
-            Resembled(name, best.share, best.model.form_share(name), name not in first)
+            Resembled(name, best.share, best.model, name not in first)
             for name in best.names
             if name not in named.names and likely(_together(every)[frozenset(best.names)])
         ),

@@ -50,15 +50,20 @@ class WeighedExplanation:
 
 @dataclass(frozen=True)
 class Resembled:
-    """An effect of the likeliest explanation that is not accepted; forms: the share by which ours
-    must be bent; share: of the misfit that the explanation takes; predicts: whether runs that were
-    held out are predicted better with it, where that is what it was judged by.
+    """An effect of the likeliest explanation that is not accepted; model: that explanation; share:
+    of the misfit that it takes; predicts: whether runs that were held out are predicted better with
+    it, where that is what it was judged by.
     """
 
     name: str
     share: float
-    forms: float
+    model: Model
     predicts: bool = True
+
+    @property
+    def forms(self) -> float:
+        """The share by which our form of the effect must be bent."""
+        return self.model.form_share(self.name)
 
 
 @dataclass(frozen=True)

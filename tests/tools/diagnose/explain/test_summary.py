@@ -55,7 +55,8 @@ def test_it_says_which_name_has_rivals(names: tuple[str, ...]) -> None:
 
 
 def test_an_effect_that_must_be_bent_far_is_said_to_resemble() -> None:
-    resembled = Resembled("torque_constant_error", 0.42, 0.4)
+    model: Any = SimpleNamespace(form_share=lambda name: 0.4)
+    resembled = Resembled("torque_constant_error", 0.42, model)
     decision = _decision("unlisted", resembled=(resembled,))
     shown = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
     assert "resembles torque_constant_error" in shown and "42 %" in shown and "40 %" in shown

@@ -46,6 +46,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = Parser(prog="python -m gritd.tools.dev.applied", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="rows; default: all")
     names = parser.parse_args(argv).names or list(CONCEALED)
+    for name in (name for name in names if name not in CONCEALED):
+        parser.error(f"{name}: expected one of {', '.join(CONCEALED)}")
     print("| concealed | found | then | " + " | ".join(CHANNELS) + " |")
     print("|---|---|---|---|---|---|")
     for name in names:

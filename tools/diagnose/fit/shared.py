@@ -181,8 +181,8 @@ def shared_terms(
 
 
 def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
-    """The terms with what varies with time, heat, place or run, and what runs begin with, no larger
-    than in the reference. Where nothing dried, warmed up or crept then, it is news if it does now.
+    """The terms with what varies with time, heat, place or run, what runs begin with, and memory no
+    larger than in the reference. Where nothing dried, crept or lagged then, it is news now.
     """
     passing = (_name(CHANGES), _name(STARTS), _name(MEMORY))
     return tuple(

@@ -40,15 +40,13 @@ def campaign(folder: Path, seed: int, *effects: str) -> list[str]:
     return files
 
 
-def diagnosed(files: list[str], configuration: Path, folder: Path) -> tuple[dict[str, Any], Path]:
+def diagnosed(
+    files: list[str], configuration: Path, folder: Path, *options: str
+) -> tuple[dict[str, Any], Path]:
     """The JSON, and the configuration that --apply wrote."""
     result, applied = folder / "d.json", folder / f"{configuration.stem}-new.yaml"
-    assert (
-        main(
-            [*files, "--config", str(configuration), "--json", str(result), "--apply", str(applied)]
-        )
-        == 0
-    )
+    written = ["--config", str(configuration), "--json", str(result), "--apply", str(applied)]
+    assert main([*files, *written, *options]) == 0
     return json.loads(result.read_text()), applied
 
 
@@ -91,3 +89,16 @@ def test_what_is_new_in_a_later_campaign_is_what_is_named(tmp_path: Path) -> Non
     }
     assert "grousers" in named, later["summary"]
     assert all(name in both.read_text() for name in known | accepted(later))
+
+
+@pytest.mark.long
+def test_what_a_reference_has_too_is_written_with_what_is_new(tmp_path: Path) -> None:
+    """Else the next campaign on the same rig would find the reference's own friction new."""
+    friction, slope = "coulomb_friction.loss=0.25", "bed_slope.angle=0.04"
+    before = campaign(tmp_path / "before", 1, friction)
+    new = campaign(tmp_path / "new", 11, friction, slope)
+    given = ["--reference", *before, "--bed", "same"]
+    found, written = diagnosed(new, packaged(), tmp_path, *given)
+    assert accepted(found) == {"bed_slope"}
+    again, _ = diagnosed(campaign(tmp_path / "again", 21, friction, slope), written, tmp_path)
+    assert again["verdict"] == "consistent", again["summary"]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gritd.estimator.config.configuration import Configuration
-from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.readings import CHANNELS, NS, Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
@@ -48,21 +48,28 @@ def capture(configuration: Configuration, path: Path, seconds: float | None, wha
     return path
 
 
-def _record(configuration: Configuration, writer: RunWriter, ended: Callable[[], bool]) -> int:
-    """Readings written; none where no sensor says anything."""
-    line, last, count = LiveLine(sys.stderr), dict[str, Reading](), 0
-    begin = shown = time.monotonic()
+def _record(
+    configuration: Configuration, writer: RunWriter, ended: Callable[[float, float], bool]
+) -> int:
+    """Readings written, until it is `ended` by the time that they cover and that nothing came [s];
+    none where no sensor says anything.
+    """
+    line, last, first, count = LiveLine(sys.stderr), dict[str, Reading](), 0, 0
+    covered = silent = 0.0
 
     with reading(configuration.settings) as drain:
-        while not ended() and (count or time.monotonic() - begin < PATIENCE):
+        heard = shown = time.monotonic()
+        while not ended(covered, silent) and (count or silent < PATIENCE):
             time.sleep(INTERVAL)
+            silent = time.monotonic() - heard
             for one in drain():
                 writer.reading(one)
                 last[one.channel] = one
-                count += 1
+                first, count = first or one.stamp, count + 1
+                covered, heard = (one.stamp - first) / NS, time.monotonic()
             if line.terminal and time.monotonic() - shown > SHOWN:
                 shown = time.monotonic()
-                line.show(_seen(shown - begin, last))
+                line.show(_seen(covered, last))
 
     line.clear()
     return count
@@ -81,21 +88,20 @@ def _value(one: Reading) -> str:
     return f"{one.value:.6g}"
 
 
-def _until(seconds: float | None) -> Callable[[], bool]:
-    """Whether it is over: after a time, or when Enter is pressed."""
+def _until(seconds: float | None) -> Callable[[float, float], bool]:
+    """Whether it is over: the readings cover so long, or no more come; or Enter is pressed."""
     if seconds:
-        end = time.monotonic() + seconds
-        return lambda: time.monotonic() >= end
+        return lambda covered, silent: covered >= seconds or silent >= PATIENCE
 
-    pressed, silent = threading.Event(), threading.Event()
+    pressed, closed = threading.Event(), threading.Event()
 
     def wait() -> None:
-        (pressed if sys.stdin.readline() else silent).set()
+        (pressed if sys.stdin.readline() else closed).set()
 
     threading.Thread(target=wait, daemon=True).start()
 
-    def over() -> bool:
-        if silent.is_set():
+    def over(covered: float, silent: float) -> bool:
+        if closed.is_set():
             raise CommandError("standard input ended; expected Enter, or --seconds", USAGE)
         return pressed.is_set()
 

@@ -23,7 +23,7 @@ from gritd.tools.calibrate.sources import Signal, points_of
 from gritd.tools.cli.command import FAILED, CommandError
 from gritd.tools.cli.terminal import LiveLine
 
-PATIENCE = 5.0  # [s] for the first reading
+PATIENCE = 5.0  # [s] for a reading
 SHOWN = 0.2  # [s] between two lines of what is seen
 
 Flags = NDArray[np.bool_]

@@ -85,7 +85,7 @@ def test_a_wheel_is_spun_while_gritd_records(tmp_path: Path) -> None:
 
     with sensing(tmp_path, at) as file:
         kept = tmp_path / "spin.mcap"
-        command = ["torque", "--config", str(file), "--record", str(kept), "--seconds", "10"]
+        command = ["torque", "--config", str(file), "--record", str(kept), "--seconds", "18"]
         assert calibrate.main([*command, "--in-place"]) == 0
     assert kept.exists()
     for truth, keys in (

@@ -193,10 +193,10 @@ class Marginal:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
         scale, acting = self._scaled(chosen)
         index = np.flatnonzero(acting & ~self._held)
-        products = self._products * scale[:, None] * scale
         prior = self._weight[index] ** 2
-        gram = products[np.ix_(index, index)] + np.diag(prior)
-        pull = products[index, -1] - prior * self._centre[index]
+        gram = self._products[np.ix_(index, index)] * scale[index, None] * scale[index]
+        gram[np.diag_indices_from(gram)] += prior
+        pull = self._products[index, -1] * scale[index] - prior * self._centre[index]
 
         root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
         own = np.isin(wanted, index)
@@ -258,23 +258,23 @@ class Marginal:
     def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
         """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
         varied = self._varied
-        products = varied.products * scale[:, None] * scale
         acting = acting & varied.acting
         weak = np.flatnonzero(acting & ~self._strong)
         strong = np.flatnonzero(acting & self._strong)
         prior, centre = self._weight[weak] ** 2, self._centre[weak]
 
-        pull = products[weak, -1] - prior * centre
-        gram = products[np.ix_(weak, weak)]
+        beside = np.concatenate((kept, strong, [-1]))
+        index = np.concatenate((weak, beside))
+        columns = varied.products[np.ix_(index, beside)] * scale[index, None] * scale[beside]
+        gram = varied.products[np.ix_(weak, weak)] * scale[weak, None] * scale[weak]
         gram[np.diag_indices_from(gram)] += prior
         root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
 
-        beside = np.concatenate((kept, strong))
-        columns = np.column_stack((products[np.ix_(weak, beside)], pull))
-        inside = solve_triangular(root, columns, lower=True, check_finite=False)
-        last, own = inside[:, -1], inside[:, :-1]
-        matrix = products[np.ix_(beside, beside)] - own.T @ own
-        right = products[beside, -1] - own.T @ last
+        columns[: len(weak), -1] -= prior * centre
+        inside = solve_triangular(root, columns[: len(weak)], lower=True, check_finite=False)
+        own, last = inside[:, :-1], inside[:, -1]
+        matrix = columns[len(weak) : -1, :-1] - own.T @ own
+        right = columns[len(weak) : -1, -1] - own.T @ last
 
         count = len(kept)
         strain = np.sum(prior * centre**2) + self._strain_of_held()
@@ -285,7 +285,7 @@ class Marginal:
             strong=matrix[count:, count:],
             strong_pull=right[count:],
             centre=self._centre[strong],
-            misfit=float(products[-1, -1] + strain - last @ last),
+            misfit=float(columns[-1, -1] + strain - last @ last),
             spread=varied.spread
             + 2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
         )

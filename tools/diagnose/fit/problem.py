@@ -20,7 +20,7 @@ from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Bools, Constant
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Near
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -339,10 +339,13 @@ class EffectsObjective:
             self.bounds.held(centre, gradient),
         )
 
-    def _predicted(self, centre: Array) -> Array:
-        acting = build(self._effects, self._free, centre[self._count :])
+    def _predicted(self, centre: Array, near: Array | None = None) -> Array:
+        begins = None if near is None else self._acting(near)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            return self._problem.stack.predict(centre[: self._count], acting)
+            return self._problem.stack.predict(*self._acting(centre), near=begins)
+
+    def _acting(self, centre: Array) -> Near:
+        return centre[: self._count], build(self._effects, self._free, centre[self._count :])
 
     def _derivatives(self, centre: Array, predicted: Array, first: int = 0) -> Array:
         """Of the prediction by every unknown (N, q + p), or by those from one on; away from a
@@ -358,7 +361,7 @@ class EffectsObjective:
             )
             moved = centre.copy()
             moved[i] += step
-            raw[:, i] = (self._predicted(moved) - predicted) / step
+            raw[:, i] = (self._predicted(moved, centre) - predicted) / step
 
         for i, (of, share) in stack.partial.items():
             raw[:, i] = share * raw[:, of]

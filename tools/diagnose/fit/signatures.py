@@ -93,7 +93,7 @@ def _derivative(
     for step in TUNING.fit.derivative_steps:
         acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            change = stack.predict(u, (*others, acting), everywhere) - base
+            change = stack.predict(u, (*others, acting), everywhere, (u, others)) - base
         if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:
             return np.asarray(change / step)
 

@@ -5,7 +5,8 @@ itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import TypeVar
 
@@ -22,6 +23,24 @@ from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.tuning import TUNING
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What readings depend on; weights (N,) and travel are factors on the motions'."""
+
+    soil: Soil
+    weights: Array
+    travelled: float
+    effects: tuple[Effect, ...]
+
+    @cached_property
+    def key(self) -> Hashable:
+        return self.soil, self.weights.tobytes(), self.travelled, self.effects
+
+    def bearing(self) -> Driven:
+        """With only the effects that bear on the soil."""
+        return replace(self, effects=tuple(e for e in self.effects if e.bears_on_soil()))
 
 
 class Campaign:
@@ -50,39 +69,37 @@ class Campaign:
         if all(_at_once(effect) for effect in effects):
             self._begins = self._balanced(soil, self._joined, effects, None).balance
 
-    def readings(
-        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
-    ) -> Array:
-        """True readings (channels, N); weights (N,) and travel are factors on the motions'."""
-        key = (soil, weights.tobytes(), travelled, tuple(effects))
-        return _recent(
-            self._readings, key, lambda: self._read_anew(soil, weights, travelled, effects)
-        )
+    def readings(self, driven: Driven, near: Driven | None = None) -> Array:
+        """True readings (channels, N); near: what has a balance from which this one is looked for,
+        if not from that of the beginning.
+        """
+        near = None if near is None or near.key == driven.key else near
+        key = driven.key, near and near.key
+        return _recent(self._readings, key, lambda: self._read_anew(driven, near))
 
-    def _read_anew(
-        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
-    ) -> Array:
+    def _read_anew(self, driven: Driven, near: Driven | None) -> Array:
+        effects = driven.effects
         if all(_at_once(effect) for effect in effects):
-            return self._read(self._solved(soil, weights, travelled, effects), effects)
+            return self._read(self._solved(driven.bearing(), near and near.bearing()), effects)
 
         read = []
         for motion, part in zip(self._motions, self.parts, strict=True):
-            scaled = _scaled(motion, weights[part], travelled)
-            near = self._begins and part_of(self._begins, part)
-            read.append(self._read(self._balanced(soil, scaled, effects, near), effects))
+            scaled = _scaled(motion, driven.weights[part], driven.travelled)
+            begins = self._begins and part_of(self._begins, part)
+            solved = self._balanced(driven.soil, scaled, effects, begins)
+            read.append(self._read(solved, effects))
         return np.hstack(read)
 
-    def _solved(
-        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
-    ) -> Carried:
+    def _solved(self, driven: Driven, near: Driven | None) -> Carried:
         """What the soil carries in all runs; solved anew only where something bears on it."""
-        bearing = tuple(effect for effect in effects if effect.bears_on_soil())
-        motion = _scaled(self._joined, weights, travelled)
-        return _recent(
-            self._carried,
-            (soil, weights.tobytes(), travelled, bearing),
-            lambda: self._balanced(soil, motion, bearing, self._begins),
-        )
+        near = None if near is None or near.key == driven.key else near
+        motion = _scaled(self._joined, driven.weights, driven.travelled)
+
+        def solved() -> Carried:
+            begins = self._begins if near is None else self._solved(near, None).balance
+            return self._balanced(driven.soil, motion, driven.effects, begins)
+
+        return _recent(self._carried, (driven.key, near and near.key), solved)
 
     def _balanced(
         self, soil: Soil, motion: Motion, effects: Sequence[Effect], near: Balance | None

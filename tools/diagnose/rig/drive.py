@@ -31,7 +31,7 @@ from gritd.estimator.terramechanics.soil import Array, Wheel
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.rig.constants import UNITS as WHEEL_UNITS
 from gritd.tools.diagnose.rig.constants import of_channel
-from gritd.tools.diagnose.rig.interface import Constant, GridRun, Rig, RigWords
+from gritd.tools.diagnose.rig.interface import Constant, GridRun, Near, Rig, RigWords
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.tuning import TUNING
@@ -102,7 +102,11 @@ class DriveModel:
     usual: float
 
     def predict(
-        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
+        self,
+        u: Array,
+        effects: Sequence[Effect],
+        in_both: Collection[str] = (),
+        near: Near | None = None,
     ) -> list[dict[str, Array]]:
         """Motor torque [N·m]: see interface.Predict."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))

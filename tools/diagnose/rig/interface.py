@@ -58,7 +58,7 @@ class Constant:
     def of(self, u: float) -> float:
         if self.log:
             return float(self.value * np.exp(u * self.sigma / self.value))
-        return float(np.clip(self.value + u * self.sigma, self.low, self.high))
+        return min(max(self.value + u * self.sigma, self.low), self.high)
 
     def strain(self, value: float) -> float:
         """u of a value: the inverse of `of`."""
@@ -179,14 +179,22 @@ def _nothing_foreseen(experiment: str, u: Array, effects: Sequence[Effect]) -> F
     raise KeyError(experiment)
 
 
+Near = tuple[Array, Sequence[Effect]]  # constants (q,) and effects near by
+
+
 class Predict(Protocol):
     """Every channel of every run."""
 
     def __call__(
-        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
+        self,
+        u: Array,
+        effects: Sequence[Effect],
+        in_both: Collection[str] = (),
+        near: Near | None = None,
     ) -> list[dict[str, Array]]:
         """Channels (n,) for constants u (q,) in prior σ and effects beyond the baseline; in_both:
-        names of those that act in the reference campaign too.
+        names of those that act in the reference campaign too; near: constants and effects from
+        whose balance that of these is looked for.
         """
 
 

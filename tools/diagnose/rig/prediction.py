@@ -11,9 +11,9 @@ from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.diagnose.rig.campaign import Campaign, parts_of, sensed_as
+from gritd.tools.diagnose.rig.campaign import Campaign, Driven, parts_of, sensed_as
 from gritd.tools.diagnose.rig.constants import LEAN, SOIL
-from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Held
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Held, Near
 from gritd.tools.diagnose.rig.proposals import proposed
 from gritd.tools.diagnose.rig.recorded import Recorded
 from gritd.tools.diagnose.tuning import TUNING
@@ -58,21 +58,22 @@ class Prediction:
             self._inner[[part.start, part.stop - 1]] = False
 
     def channels(
-        self, u: Array, effects: Sequence[Effect], in_both: Collection[str] = ()
+        self,
+        u: Array,
+        effects: Sequence[Effect],
+        in_both: Collection[str] = (),
+        near: Near | None = None,
     ) -> list[dict[str, Array]]:
         """See interface.Predict."""
         value = self._values(u)
-        baseline = self._baseline(value)
-        # relative error of each set of weights for itself, the last of values without one
-        own = np.array([*(value[name] for name in self._data.sets.names), 0.0])
+        driven = self._driven(value, effects, in_both)
+        begins: Sequence[Driven | None] = [None] * len(driven)
+        if near is not None:
+            begins = self._driven(self._values(near[0]), near[1], in_both)
 
-        true = []  # readings (channels, n) of each campaign before scale, offset and delay
-        for new, campaign in self._campaigns:
-            acting = (*baseline, *(e for e in effects if new or e.name in in_both))
-            weights = 1.0 + value["weights"] + own[self._data.set_of(new)]
-            travelled = 1.0 + value["carriage_scale"]
-            true.append(campaign.readings(self._soil(value, new), weights, travelled, acting))
-
+        # readings (channels, n) of each campaign before scale, offset and delay
+        parts = zip(self._campaigns, driven, begins, strict=True)
+        true = [campaign.readings(own, begin) for (_, campaign), own, begin in parts]
         read = self._read(np.hstack(true), value) + self._mean
         return [dict(zip(self._channels, read[:, part], strict=True)) for part in self._parts]
 
@@ -98,6 +99,23 @@ class Prediction:
         # at rest and lifted the motor current alone tells something
         driving = (np.asarray(motion.wheel_speed) != 0.0) & (np.asarray(motion.load) > 0.0)
         return Foreseen(compared, {c: driving | (c == "torque") for c in self._channels})
+
+    def _driven(
+        self, value: Mapping[str, float], effects: Sequence[Effect], in_both: Collection[str]
+    ) -> list[Driven]:
+        """What the readings of each campaign depend on."""
+        baseline = self._baseline(value)
+        # relative error of each set of weights for itself, the last of values without one
+        own = np.array([*(value[name] for name in self._data.sets.names), 0.0])
+        return [
+            Driven(
+                self._soil(value, new),
+                1.0 + value["weights"] + own[self._data.set_of(new)],
+                1.0 + value["carriage_scale"],
+                (*baseline, *(e for e in effects if new or e.name in in_both)),
+            )
+            for new, _ in self._campaigns
+        ]
 
     def _values(self, u: Array) -> dict[str, float]:
         return {c.name: c.of(float(x)) for c, x in zip(self._constants, u, strict=True)}

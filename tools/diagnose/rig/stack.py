@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Channels, Index, Rig
+from gritd.tools.diagnose.rig.interface import Bools, Channels, Index, Near, Rig
 
 
 class Stack:
@@ -99,12 +99,18 @@ class Stack:
         first = np.diff(self.channel[kept] * len(self.rig.runs) + self.run[kept], prepend=-1) != 0
         return np.where(first, np.inf, gap)
 
-    def predict(self, u: Array, effects: Sequence[Effect] = (), everywhere: bool = False) -> Array:
+    def predict(
+        self,
+        u: Array,
+        effects: Sequence[Effect] = (),
+        everywhere: bool = False,
+        near: Near | None = None,
+    ) -> Array:
         """(N,) in the channels' units, for constants u (q,) in prior σ; everywhere: the effects act
-        in the reference campaign too.
+        in the reference campaign too; near: see interface.Predict.
         """
         in_both = [effect.name for effect in effects] if everywhere else self.in_both
-        return self.joined(self.rig.predict(u, effects, in_both))
+        return self.joined(self.rig.predict(u, effects, in_both, near))
 
     @cached_property
     def referred(self) -> bool:

@@ -22,7 +22,7 @@ class Bench:
     def __init__(self, limit: float) -> None:
         self.limit = limit
 
-    def predict(self, _: Any, effects: tuple[MotorHeating, ...], __: bool = False) -> Any:
+    def predict(self, _: Any, effects: tuple[MotorHeating, ...], *__: Any) -> Any:
         strength = sum(getattr(effect, strengths(MotorHeating)[0].name) for effect in effects)
         return self.measured * (1.0 + strength if strength < self.limit else np.exp(1e9 * strength))
 

@@ -16,7 +16,7 @@ from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SLIGHT, WAY
+from gritd.tools.diagnose.tuning.guards import SLIGHT, UNCHANGED, WAY
 
 Taken = TypeVar("Taken")
 
@@ -68,11 +68,22 @@ def signature(
         _derivative(stack, u, base, effect, fixed, p, others, everywhere) for p in strengths(effect)
     ]
     columns = np.column_stack(derivatives)
-    if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
+    if not np.isfinite(columns).all() or not _shows(stack, base, columns):
         return None
 
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
     return Signature(effect.name, columns, sign, dict(fixed))
+
+
+def _shows(stack: Stack, base: Array, columns: Array) -> bool:
+    """Whether columns (N, p) change a channel of the prediction (N,) by more than its balance is
+    solved to.
+    """
+    own = (stack.of(channel) for channel in stack.rig.channels)
+    return any(
+        np.abs(columns[of]).max(initial=0.0) > UNCHANGED * np.abs(base[of]).max(initial=0.0)
+        for of in own
+    )
 
 
 def _derivative(

@@ -11,6 +11,7 @@ SIZE = 1e-12  # of a value's size, in the value's unit
 SLIGHT = 1e-6  # of an angle [rad], a turning speed [rad/s], or a noise in that of its channel
 SPEED = 1e-4  # of a wheel's rim that drives [m/s]
 WAY = 1e-3  # of the bed that was driven [m]
+UNCHANGED = 1e-8  # of a channel's largest value: above what a vertical balance is solved to
 ROUNDING = 1e-9  # of a fit's unknown, in its prior σ: nearer to a bound it is on it
 DEPENDENT = 1e-6  # of the largest singular value: columns that do the same
 DAMPING_LEAST = 1e-7  # of a descent's curvature; and of its inverse the most

@@ -79,12 +79,18 @@ class ContactRelaxation(Effect):
         return None
 
     def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
+        if np.ndim(situation.torque) == 0:
+            return reaction
+        length = self._length(situation)
+        shares = self._shares(situation, length), self._shares(situation, SLIP_KNOWN)
+        deeper, run = self._shares(situation, self.deeper * length), situation.run
+        sunk = followed(situation.sinkage, deeper, run) - situation.sinkage
         return replace(
             reaction,
-            torque=reaction.torque + self._forces_behind(situation.torque, situation),
+            torque=reaction.torque + self._behind(situation.torque, situation, *shares),
             drawbar_pull=reaction.drawbar_pull
-            + self._forces_behind(situation.drawbar_pull, situation),
-            sinkage=reaction.sinkage + self._sinkage_behind(situation),
+            + self._behind(situation.drawbar_pull, situation, *shares),
+            sinkage=reaction.sinkage + self.sinkage * sunk,
         )
 
     def answered(self, slip: Scalar, load: Scalar, situation: Complete) -> tuple[Scalar, Scalar]:
@@ -118,24 +124,16 @@ class ContactRelaxation(Effect):
         shallow = np.maximum(np.sin(situation.theta_1), SHALLOW)
         return self.length * (1.0 - self.longer + self.longer * shallow / USUAL)
 
-    def _forces_behind(self, steady: Scalar, situation: Balanced) -> Scalar:
-        """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too."""
-        if np.ndim(steady) == 0:
-            return 0.0
+    def _behind(self, steady: Scalar, situation: Balanced, share: Array, known: Array) -> Array:
+        """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too. share,
+        known: of the way to y∞ (n,), over Λ and until the slip is known.
+        """
         run, way = situation.run, np.asarray(situation.direction)
-        share = self._shares(situation, self._length(situation))
         signed = np.abs(way) * (followed(steady, share, run) - steady)
         size = run_by_run(_size, run, steady, way)
-        begun = run_by_run(_begun, run, size, self._shares(situation, SLIP_KNOWN))
+        begun = run_by_run(_begun, run, size, known)
         sized = way * (followed(begun, share, run) - size)
         return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
-
-    def _sinkage_behind(self, situation: Balanced) -> Scalar:
-        steady = situation.sinkage
-        if np.ndim(steady) == 0:
-            return 0.0
-        share = self._shares(situation, self.deeper * self._length(situation))
-        return self.sinkage * (followed(steady, share, situation.run) - steady)
 
     def _shares(self, situation: Balanced, length: Scalar) -> Array:
         """Of the way to y∞ that ȳ goes from one sample to the next over a length [m] (n,)."""

@@ -109,7 +109,8 @@ def run_by_run(of: Callable[..., Array], run: Scalar, *along: Scalar) -> Array:
 def run_begins(run: Scalar, count: int) -> Bools:
     """Whether a run begins at a sample (n,)."""
     runs = np.broadcast_to(run, count)
-    begins: Bools = np.append(True, np.diff(runs) != 0.0)[:count]
+    begins: Bools = np.ones(count, bool)
+    begins[1:] = runs[1:] != runs[:-1]
     return begins
 
 

@@ -239,21 +239,21 @@ class Marginal:
         values = np.maximum(values, 0.0)
         turned = vectors.T @ rest.to_strong
         pulled = vectors.T @ rest.pull
-        for which, size in enumerate(self.terms[number].sizes.values):
-            share = size**2 / (1.0 + size**2 * values)
-            misfit = rest.misfit - share @ pulled**2
-            spread = rest.spread + np.log1p(size**2 * values).sum()
-            a = rest.strong - (turned * share[:, None]).T @ turned
-            b = rest.strong_pull - turned.T @ (share * pulled)
+        square = np.array(self.terms[number].sizes.values)[:, None] ** 2
+        share = square / (1.0 + square * values)  # (sizes, columns of the term)
+        misfit = rest.misfit - share @ pulled**2
+        spread = rest.spread + np.log1p(square * values).sum(axis=1)
+        a = rest.strong - turned.T @ (share[:, :, None] * turned)
+        b = rest.strong_pull - (share * pulled) @ turned
+        strength = strength_evidence(self._strengths, a, b, rest.centre)
+        for which, known in enumerate((strength - 0.5 * (misfit + spread)).tolist()):
             these = (*chosen[:number], which, *chosen[number + 1 :])
-            self._known[these] = self._of_sizes(these, misfit, spread, a, b, rest.centre)
+            self._known[these] = self._prior(these) + known
 
-    def _of_sizes(
-        self, chosen: Chosen, misfit: float, spread: float, a: Array, b: Array, centre: Array
-    ) -> float:
-        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.terms, chosen, strict=True))
-        strength = strength_evidence(self._strengths, a, b, centre)
-        return float(sizes - 0.5 * (misfit + spread) + strength)
+    def _prior(self, chosen: Chosen) -> float:
+        """Log prior of given sizes."""
+        pairs = zip(self.terms, chosen, strict=True)
+        return float(sum(f.sizes.log_prior[i] for f, i in pairs))
 
     def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
         """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
@@ -317,9 +317,8 @@ class Marginal:
         scale, acting = self._scaled(chosen)
         none = np.zeros(0, dtype=np.intp)
         rest = self._eliminated(scale, acting, none)
-        return self._of_sizes(
-            chosen, rest.misfit, rest.spread, rest.strong, rest.strong_pull, rest.centre
-        )
+        strength = strength_evidence(self._strengths, rest.strong, rest.strong_pull, rest.centre)
+        return self._prior(chosen) + float(strength) - 0.5 * (rest.misfit + rest.spread)
 
     def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:
         """Factors of all columns and the residual; which columns act."""
@@ -350,12 +349,12 @@ def _products(fitted: Fitted, terms: Sequence[RandomEffect]) -> Array:
     )
 
 
-def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> float:
-    """What strengths add to the log evidence, from curvature (p, p) and slope (p,) of the
-    likelihood where they stand.
+def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> Array:
+    """What strengths add to the log evidence (…), from curvature (…, p, p) and slope (…, p) of the
+    likelihood where they stand (p,).
     """
     if not at.size:
-        return 0.0
+        return np.zeros(b.shape[:-1])
 
     sign = [int(f.parameter.low >= f.parameter.off) for f in strengths]
     names = [f.name for f in strengths]
@@ -365,8 +364,11 @@ def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) 
     ]
 
     pull = b + a @ at  # seen from strengths of nought
-    factors = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
-    return float(log_sum(factors) - np.log(len(factors)) - b @ at - 0.5 * at @ a @ at)
+    factors = [
+        log_bayes(a[..., np.array(s)[:, None], s], pull[..., s], [sign[i] for i in s])
+        for s in chosen
+    ]
+    return np.asarray(log_sum(factors) - np.log(len(factors)) - b @ at - 0.5 * at @ a @ at)
 
 
 def _choices(strengths: list[int]) -> list[list[int]]:

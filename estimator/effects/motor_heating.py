@@ -16,22 +16,31 @@ from gritd.estimator.terramechanics.soil import Scalar
 class MotorHeating(Effect):
     """Current warms the winding and the magnets, and the torque per ampere falls.
 
-    K_t / (1 + β H),   τ dH/dt = I² − H,   H = 0 at the start of the run
+    K_t / (1 + β H + β_w H_w),   τ dH/dt = I² − H,   τ_w dH_w/dt = I² − H_w
+    H = H_w = 0 at the start of the run
 
-    Source: one-body winding thermal model τ dΔT/dt = R_th R I² − ΔT with K_t falling linearly in a
-    small ΔT, Hendershot and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins
+    Source: thermal model of two bodies, Hendershot and Miller (2010), Design of Brushless
+    Permanent-Magnet Machines: each answers R I² with two time constants, of the housing with the
+    magnets and of the winding; K_t falls linearly in small rises of temperature; β and β_w join
     thermal resistance and magnet coefficient.
     """
 
     fall: float = strength(
         "relative fall per squared current, β", "1/A^2", typical=0.15, low=0.0, high=5.0
     )
+    winding_fall: float = strength(
+        "the same by the winding's heat, β_w", "1/A^2", typical=0.05, low=0.0, high=5.0
+    )
     duration: float = shape(
         "thermal time constant, τ", "s", mean=300.0, sigma=200.0, low=2.0, high=3600.0, scan=True
+    )
+    winding: float = shape(
+        "that of the winding, τ_w", "s", mean=20.0, sigma=15.0, low=2.0, high=120.0
     )
 
     stage = "drivetrain"
     every_run = True
+    at_start = (0.0, 0.0)
     fingerprint = Fingerprint(
         "torque", "heat", "current creeps up over a run while measured axle torque stays"
     )
@@ -40,14 +49,23 @@ class MotorHeating(Effect):
     )
 
     def torque_factor(self, situation: Powered) -> Scalar:
-        return 1.0 / (1.0 + self.fall * self._heat(situation))
+        housing, winding = self._heat(situation)
+        return 1.0 / (1.0 + self.fall * housing + self.winding_fall * winding)
 
     def remember(self, memory: Recall, step: float, situation: Powered) -> Recall:
-        (heat,) = memory
-        return (float(heat + (situation.current**2 - heat) * -np.expm1(-step / self.duration)),)
+        return tuple(
+            float(heat + (situation.current**2 - heat) * -np.expm1(-step / duration))
+            for heat, duration in zip(memory, self._durations, strict=True)
+        )
 
-    def _heat(self, situation: Powered) -> Scalar:
-        """H [A²]."""
+    @property
+    def _durations(self) -> tuple[float, float]:
+        """τ, τ_w [s]."""
+        return self.duration, self.winding
+
+    def _heat(self, situation: Powered) -> tuple[Scalar, ...]:
+        """H, H_w [A²]."""
         if self.name in situation.memory:
-            return situation.memory[self.name][0]
-        return relaxed(situation.time, situation.current**2, self.duration, situation.run)
+            return situation.memory[self.name]
+        squared, time, run = situation.current**2, situation.time, situation.run
+        return tuple(relaxed(time, squared, duration, run) for duration in self._durations)

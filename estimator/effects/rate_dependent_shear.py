@@ -11,6 +11,7 @@ from gritd.estimator.effects.base import (
     RATE_REFERENCE,
     Effect,
     Fingerprint,
+    shape,
     strength,
     told_apart,
 )
@@ -21,15 +22,24 @@ from gritd.estimator.stages.situation import ContactLaw, Situation
 class RateDependentShear(Effect):
     """Soil is stronger when it is sheared faster.
 
-    (c, tan φ) · [1 + λ log₁₀((r|ω| + v_f)/(v₀ + v_f))]
+    (c, tan φ) · [1 + λ log₁₀((u + v_f)/(v₀ + v_f))],   u = (1 − m) r|ω| + m |rω − v|
     v₀ = 20 mm/s;   v_f = 1 mm/s keeps a standing wheel finite
 
+    The speed is that of the rim (m = 0), or that at which it slides past the soil (m = 1).
     Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten
-    per cent a decade.
+    per cent a decade of the rate of shearing.
     """
 
     per_decade: float = strength(
         "gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.3, high=0.6
+    )
+    sliding: float = shape(
+        "share in which the speed is that of sliding, m",
+        "",
+        mean=0.0,
+        sigma=0.5,
+        low=0.0,
+        high=1.0,
     )
 
     stage = "contact"
@@ -45,6 +55,8 @@ class RateDependentShear(Effect):
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
-        speed = situation.radius * np.abs(situation.wheel_speed)
+        rim = situation.radius * situation.wheel_speed
+        past = np.abs(rim - situation.carriage_speed)
+        speed = np.abs(rim) + self.sliding * (past - np.abs(rim))
         decades = np.log10((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR))
         return replace(law, strength=law.strength * (1.0 + self.per_decade * decades))

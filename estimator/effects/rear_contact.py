@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
 from gritd.estimator.stages.situation import ContactLaw, Situation
 
@@ -12,13 +14,14 @@ from gritd.estimator.stages.situation import ContactLaw, Situation
 class RearContact(Effect):
     """Soil springs back behind the wheel and still touches it past bottom dead centre.
 
-    θ₂ = −c₃ θ₁, in the rear zone of Eq. (4) and in the integrals (8)-(10)
+    θ₂ = −(c₃ + c₄ i) θ₁ ≤ 0, in the rear zone of Eq. (4) and in the integrals (8)-(10)
 
     Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98; Ishigami et al. (2007), J. Field
-    Robotics 24, 233-250.
+    Robotics 24, 233-250, where the ratio depends on soil, rim and slip.
     """
 
     ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=1.0)
+    slip_ratio: float = strength("added to c₃ with slip, c₄", "", typical=0.2, low=-1.0, high=1.0)
 
     stage = "contact"
     fingerprint = Fingerprint(
@@ -32,4 +35,5 @@ class RearContact(Effect):
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
-        return replace(law, theta_2_ratio=law.theta_2_ratio + self.ratio)
+        ratio = np.maximum(self.ratio + self.slip_ratio * situation.slip, 0.0)
+        return replace(law, theta_2_ratio=law.theta_2_ratio + ratio)

@@ -190,16 +190,14 @@ def _named(
 
 def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:
     """The likeliest explanation of the likeliest number of effects: many alike sets of two weigh
-    together against one. Of equally likely ones the one with the fewest parameters.
+    together against one. Of those that are equally likely as they are stated the one with the
+    fewest parameters.
     """
     sizes = {len(w.names) for w in weighed}
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
     together = _together(weighed)
     plain = [w for w in weighed if len(w.names) == size and not w.nameless]
-    chance = {id(w): together[frozenset(w.names)] for w in plain}
-    equal = max(chance.values()) / TUNING.verdict.equally_likely
-    simple = [w for w in plain if chance[id(w)] >= equal]
-    return min(simple, key=lambda w: (_parameters(w.model), -chance[id(w)]))
+    return max(plain, key=lambda w: (round(together[frozenset(w.names)], 2), -_parameters(w.model)))
 
 
 def _parameters(model: Model) -> int:

@@ -11,6 +11,8 @@ from gritd.estimator.stages.history import relaxed
 from gritd.estimator.stages.situation import Powered, Recall
 from gritd.estimator.terramechanics.soil import Scalar
 
+LEAST = 0.02  # of K_t is always left
+
 
 @dataclass(frozen=True)
 class MotorHeating(Effect):
@@ -29,13 +31,13 @@ class MotorHeating(Effect):
         "relative fall per squared current, β", "1/A^2", typical=0.15, low=0.0, high=5.0
     )
     winding_fall: float = strength(
-        "the same by the winding's heat, β_w", "1/A^2", typical=0.05, low=0.0, high=5.0
+        "the same by the winding's heat, β_w", "1/A^2", typical=0.03, low=0.0, high=5.0
     )
     duration: float = shape(
         "thermal time constant, τ", "s", mean=300.0, sigma=200.0, low=2.0, high=3600.0, scan=True
     )
     winding: float = shape(
-        "that of the winding, τ_w", "s", mean=20.0, sigma=15.0, low=2.0, high=120.0
+        "that of the winding, τ_w", "s", mean=40.0, sigma=25.0, low=2.0, high=120.0
     )
 
     stage = "drivetrain"
@@ -50,7 +52,8 @@ class MotorHeating(Effect):
 
     def torque_factor(self, situation: Powered) -> Scalar:
         housing, winding = self._heat(situation)
-        return 1.0 / (1.0 + self.fall * housing + self.winding_fall * winding)
+        left = 1.0 / (1.0 + self.fall * housing + self.winding_fall * winding)
+        return np.maximum(left, LEAST)
 
     def remember(self, memory: Recall, step: float, situation: Powered) -> Recall:
         return tuple(

@@ -12,7 +12,7 @@ from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.filter.shift import IntegralShift
 from gritd.estimator.model import balance
 from gritd.estimator.model.forward import Response, simulate_arrays
-from gritd.estimator.stages.situation import ContactLaw, Motion
+from gritd.estimator.stages.situation import ContactLaw, Motion, situation_of
 from gritd.estimator.terramechanics.original import forces
 from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, typical
 
@@ -34,6 +34,46 @@ def test_a_smooth_rim_is_a_rim_on_a_weaker_soil(motion: Motion) -> None:
     expected = simulate_arrays(WHEEL, weaker, motion)
     np.testing.assert_allclose(found.torque, expected.torque, rtol=1e-9)
     np.testing.assert_allclose(found.sinkage, expected.sinkage, rtol=1e-9)
+
+
+@pytest.mark.parametrize("stiff", [30.0, 0.02])
+def test_a_rim_slides_where_soil_would_carry_more(motion: Motion, stiff: float) -> None:
+    """Soil that has hardly moved knows nothing of the rim; soil that yields at once is a weaker one
+    to it. stiff: the shear modulus k over the usual one.
+    """
+    soil = replace(SOIL, shear_modulus=stiff * SOIL.shear_modulus)
+    sliding = {"smoothness": 0.3, "adhesion_loss": 0.3, "sliding": 1.0}
+    found = simulate_arrays(WHEEL, soil, motion, (make("rim_friction", sliding),))
+    share = 1.0 if stiff > 1.0 else 0.7
+    weaker = replace(soil, cohesion=share * soil.cohesion, tan_phi=share * soil.tan_phi)
+    expected = simulate_arrays(WHEEL, weaker, motion)
+    np.testing.assert_allclose(found.torque, expected.torque, rtol=0.02, atol=1e-3)
+
+
+def test_soil_springs_back_less_where_it_slips(motion: Motion, plain: Response) -> None:
+    """A ratio that falls with slip is one ratio at one slip, and none beyond where it ends."""
+    slip = np.asarray(situation_of(motion, WHEEL).slip)
+    falling = make("rear_contact", {"ratio": 0.2, "slip_ratio": -0.5})
+    found = simulate_arrays(WHEEL, SOIL, motion, (falling,)).sinkage
+    for some in ((slip > 0.19) & (slip < 0.21), slip > 0.45):
+        at = float(np.clip(0.2 - 0.5 * np.median(slip[some]), 0.0, 1.0))
+        one = simulate_arrays(WHEEL, SOIL, motion, (make("rear_contact", {"ratio": at}),))
+        assert some.sum() > 20
+        np.testing.assert_allclose(found[some], one.sinkage[some], rtol=0.01)
+
+
+def test_soil_is_sheared_as_fast_as_the_rim_slides(motion: Motion) -> None:
+    """Where the rim slides as fast, strength is the same, whatever it is elsewhere."""
+    rate = {"per_decade": 0.1, "sliding": 1.0}
+    found = simulate_arrays(WHEEL, SOIL, motion, (make("rate_dependent_shear", rate),)).torque
+    past = WHEEL.radius * np.asarray(motion.wheel_speed) - np.asarray(motion.carriage_speed)
+    for quantile in (0.1, 0.9):
+        speed = np.quantile(past, quantile)
+        some = np.abs(past - speed) < 0.01 * speed
+        strength = 1.0 + 0.1 * np.log10((speed + 1e-3) / (0.02 + 1e-3))
+        other = replace(SOIL, cohesion=strength * SOIL.cohesion, tan_phi=strength * SOIL.tan_phi)
+        expected = simulate_arrays(WHEEL, other, motion).torque
+        np.testing.assert_allclose(found[some], expected[some], rtol=2e-3)
 
 
 @pytest.mark.parametrize("slip", [0.05, 0.4])

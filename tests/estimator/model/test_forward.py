@@ -273,11 +273,12 @@ def test_a_float_instant_gives_what_the_array_gives() -> None:
 
 
 def test_heating_on_line_follows_the_batch() -> None:
-    effect = make("motor_heating", {"fall": 0.5, "duration": 5.0})
+    heat = {"fall": 0.5, "duration": 5.0, "winding_fall": 0.2, "winding": 3.0}
+    effect = make("motor_heating", heat)
     current = 1.0 + np.sin(np.arange(300) / 20.0)
     situation = advanced(Complete, situation_of(steady(n=300), WHEEL), **BALANCED, current=current)
     batch = effect.torque_factor(situation)
-    memory, live = (0.0,), []
+    memory, live = effect.at_start, []
     for now in current:
         at = replace(situation, current=now, memory={effect.name: memory})
         memory = effect.remember(memory, 0.04, at)

@@ -28,6 +28,9 @@ class Verdict:
         "of an effect where nothing shows, shared by all candidates",
         "of ten testbeds with one effect left out, one or two have a second that shows",
     )
+    equally_likely: float = tuned(
+        1.25, "odds", "of explanations of as many effects, below which the simplest comes first"
+    )
 
     # --- resemblance.py, of each of `fit.form_error_sizes` ---
     share_power: float = tuned(

@@ -108,7 +108,7 @@ def judged(
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    best = _best([w for w in every if w.names] or every)
+    best = _best([w for w in every if w.names] or every, _unlisted(every))
     first = _accepted(every, best)
     named, share, whole = _named(search, best, first, beside)
     if named.names and not _predicts(search, whole.model if whole is not None else named):
@@ -188,16 +188,20 @@ def _named(
     return model, share, beside[model] if model in beside else _with_unexplained(search, model)
 
 
-def _best(weighed: Sequence[WeighedExplanation]) -> WeighedExplanation:
+def _best(weighed: Sequence[WeighedExplanation], unlisted: float) -> WeighedExplanation:
     """The likeliest explanation of the likeliest number of effects: many alike sets of two weigh
-    together against one. Of those that are equally likely as they are stated the one with the
-    fewest parameters.
+    together against one. Of equally likely ones the one with the fewest parameters, but none that
+    is less likely than that nothing of the list is there before one that is likelier.
     """
     sizes = {len(w.names) for w in weighed}
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
     together = _together(weighed)
     plain = [w for w in weighed if len(w.names) == size and not w.nameless]
-    return max(plain, key=lambda w: (round(together[frozenset(w.names)], 2), -_parameters(w.model)))
+    chance = {id(w): together[frozenset(w.names)] for w in plain}
+    top = max(chance.values())
+    equal = max(top / TUNING.verdict.equally_likely, min(unlisted, top))
+    simple = [w for w in plain if chance[id(w)] >= equal]
+    return min(simple, key=lambda w: (_parameters(w.model), -chance[id(w)]))
 
 
 def _parameters(model: Model) -> int:

@@ -167,6 +167,23 @@ def test_of_equals_the_simplest_comes_first(names_alone: None) -> None:
         assert decide.judged(search, weighed, {}, learnt(30)).best.names == (first,)
 
 
+def test_a_simpler_name_that_is_less_likely_than_none_comes_after_one_that_is_likelier(
+    names_alone: None,
+) -> None:
+    by = learnt(30)
+    bare, plain, richer = Fit((), 0), Fit(("plain",)), Fit(("richer",), 2)
+    even = by.temperature * (by.nameless - by.listed + np.log(30))
+    weighed: Any = [decide.WeighedExplanation(cast(Any, bare), (), 1, 0.0)] + [
+        decide.WeighedExplanation(
+            cast(Any, fit), fit.names, 0, even + by.temperature * more, 0.0, 0.9, (1.0,)
+        )
+        for fit, more in ((plain, -0.06), (richer, 0.09))
+    ]
+    found = decide.judged(_searched(bare), weighed, {}, by)
+    assert found.probability["plain"] < found.unlisted < found.probability["richer"]
+    assert found.best.names == ("richer",)
+
+
 def test_a_form_error_that_no_published_law_needs_tells_against_a_name() -> None:
     """As much likelihood without bending and with it says little; bending that pays says much."""
     straight, open_, bent = np.exp([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])

@@ -202,7 +202,8 @@ def mobilised(x: Array, rim: Rim) -> Array:
     P x e^(1 − x) is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay
     to a residual. 2 Q tanh y/cosh y, y = 2x, is that of Kacigin and Guskov (1968), J.
     Terramechanics 5(3), of a crust that breaks early.
-    A rim that slides takes over no more than 1 − s of the strength.
+    A rim that slides gives way beside the soil, by a hyperbola that ends at 1 − s of the strength:
+    Clough and Duncan (1971), J. Soil Mech. Found. Div. 97, 1657-1673.
     """
     far = np.abs(x)
     fading = np.exp(-far)
@@ -211,7 +212,7 @@ def mobilised(x: Array, rim: Rim) -> Array:
     if np.any(rim.brittle):
         share = share + 4.0 * rim.brittle * np.tanh(2.0 * far) * fading**2 / (1.0 + fading**4)
     if np.any(rim.sliding):
-        share = np.minimum(share, np.where(rim.sliding > 0.0, 1.0 - rim.sliding, np.inf))
+        share = share * (1.0 - rim.sliding) / (1.0 - rim.sliding + rim.sliding * share)
 
     signed: Array = np.sign(x) * share
     return signed

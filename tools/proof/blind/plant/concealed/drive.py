@@ -136,21 +136,24 @@ class HousedWinding(PlantEffect):
     """Winding and housing, each with its temperature; the magnets follow the housing, the flux
     falls with them.
 
-    τ₁ u̇ = I² (1 + ρ u) − (u − w), τ₂ ẇ = (u − w) − w/2; K_t falls by β (0.3 u + 0.7 w) of itself.
-    u, w in A².
+    τ₁ u̇ = I² (1 + ρ u) − (u − w), τ₂ ẇ = (u − w) − ½ w (w/w₀)^¼; K_t falls by β (0.3 u + 0.7 w) of
+    itself. u, w in A².
     Source: two-body thermal network, Hendershot and Miller (2010), Design of Brushless
-        Permanent-Magnet Machines.
+        Permanent-Magnet Machines; the housing is cooled by air that rises, Incropera et al.
+        (2007), Fundamentals of Heat and Mass Transfer, 6th ed., section 9.6.
     """
 
     winding: float = 15.0  # τ₁ [s]
     housing: float = 90.0  # τ₂ [s]
+    usual: float = 1.0  # w₀ [A²]
 
     name, most = "motor_heating", 0.1
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         fall = 0.25 / max(facts.current, 0.1) ** 2
-        return cls(fall, float(rng.uniform(8.0, 25.0)), float(rng.uniform(60.0, 200.0)))
+        times = float(rng.uniform(8.0, 25.0)), float(rng.uniform(60.0, 200.0))
+        return cls(fall, *times, max(facts.current, 0.1) ** 2)
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
         """True current (n,) [A] from that of an ideal motor (n,) [A]. Both bodies are cold at
@@ -162,8 +165,9 @@ class HousedWinding(PlantEffect):
             flux = 1.0 - self.strength * (0.3 * winding + 0.7 * housing)
             amperes = wanted / max(flux, 0.2)
             copper = amperes**2 * (1.0 + 0.1 * self.strength * winding)
+            lost = 0.5 * housing * (housing / self.usual) ** 0.25
             winding += step / self.winding * (copper - (winding - housing))
-            housing += step / self.housing * ((winding - housing) - 0.5 * housing)
+            housing += step / self.housing * ((winding - housing) - lost)
             drawn.append(amperes)
         return np.array(drawn)
 

@@ -165,8 +165,8 @@ class PolishedRim(PlantEffect):
 
 @dataclass(frozen=True)
 class SlidingRim(PlantEffect):
-    """Shear builds up in the soil as ever, but the rim slides where it comes to 1 − s of the
-    strength. See `contact.mobilised`.
+    """Shear builds up in the soil as ever, but the rim gives way the more, the nearer it comes to
+    1 − s of the strength. See `contact.mobilised`.
     """
 
     name, most = "rim_friction", 0.4

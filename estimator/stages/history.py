@@ -10,7 +10,6 @@ from math import exp, log1p
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs
 
 from gritd.estimator.terramechanics.soil import Array, Scalar
 
@@ -115,10 +114,17 @@ def run_begins(run: Scalar, count: int) -> Bools:
 
 
 def _relax(target: Array, share: Array) -> Array:
-    """y_n = y_(n−1) + share_n (target_n − y_(n−1)), a triangular system of two bands; the first
-    share must be 1.
+    """y_n = y_(n−1) + share_n (target_n − y_(n−1)), all samples at once; the first share must be 1.
+
+    Two steps are one step of the same form, so the reach of a step is doubled until it covers the
+    run: Hillis and Steele (1986), Comm. ACM 29, 1170-1183.
     """
-    band = np.ones((2, share.size), order="F")
-    band[1, :-1] = share[1:] - 1.0
-    y: Array = dtbtrs(band, share * target, uplo="L", diag="U")[0]
+    kept, y = 1.0 - share, share * target
+    reach = 1
+
+    while reach < y.size and kept.any():
+        y[reach:] += kept[reach:] * y[:-reach]
+        kept[reach:] = kept[reach:] * kept[:-reach]
+        reach *= 2
+
     return y

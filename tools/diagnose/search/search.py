@@ -255,20 +255,23 @@ def shared(search: EffectSearch) -> list[object]:
 
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
-    """The model with one more effect, the best of its starts. Where it ends well below the model
-    that it holds, it is at a poor local optimum: it is fitted again from there, with the effect's
+    """The model with one more effect, the best of its starts. Where it ends well below what linear
+    algebra foretold, the discrepancy may have taken the effect's part: it is fitted again from
+    none. Where it ends well below the model that it holds, also from there, with the effect's
     strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
     begins = [(one.start, one.sizes) for one in predicted.starts]
     made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
-    if made.evidence > model.evidence - TUNING.search.little:
+    if made.evidence > predicted.evidence - TUNING.search.little:
         return made
 
-    strengths = [p.role == "strength" for p in effect.parameters()]
-    none = np.where(strengths, 0.0, predicted.starts[0].start)
-    again = _fitted_with(search, predicted, none, model.sizes)
-    return max(made, again, key=lambda m: m.evidence)
+    again = [(predicted.starts[0].start, tuple(0 for _ in model.sizes))]
+    if made.evidence <= model.evidence - TUNING.search.little:
+        strengths = [p.role == "strength" for p in effect.parameters()]
+        again.append((np.where(strengths, 0.0, predicted.starts[0].start), model.sizes))
+    others = [_fitted_with(search, predicted, *b) for b in again]
+    return max(made, *others, key=lambda m: m.evidence)
 
 
 def _fitted_with(

@@ -149,20 +149,20 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
     return centred
 
 
-def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
+def block_slope(time: Array, values: Array, edges: Array, quick: int = QUICK) -> Slopes:
     """Value and slope of an encoder at the middle of each block (n,).
 
     time [s], values (m,) in order of time; edges (n + 1,) [s]. By a line fitted over the block and
-    its neighbours, QUICK to either side; where the slope is steady within its own noise, STEADY or
-    LONG to either side, if that line leaves no more than the short one: at creeping speed one
+    its neighbours, `quick` to either side; where the slope is steady within its own noise, STEADY
+    or LONG to either side, if that line leaves no more than the short one: at creeping speed one
     count is much of the slip, and counts that beat with the sampling make slow waves of what was
     steady.
     """
-    best, left = _block_lines(time, values, edges, QUICK)
-    quick, calm = best.rate, np.ones(best.rate.size, bool)
+    best, left = _block_lines(time, values, edges, quick)
+    short, calm = best.rate, np.ones(best.rate.size, bool)
     for reach in (STEADY, LONG):
         far, more = _block_lines(time, values, edges, reach)
-        off = np.abs(np.nan_to_num(quick - far.rate))
+        off = np.abs(np.nan_to_num(short - far.rate))
         usual = np.median(_neighbours(left, reach), axis=1)
         same = (off <= CALM * NORMAL * np.median(off)) & (
             (reach == STEADY) | (more <= GROWN * usual)
@@ -171,6 +171,20 @@ def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
         best = Slopes(*(np.where(calm, one, other) for one, other in zip(far, best, strict=True)))
 
     return best
+
+
+def block_bend(time: Array, values: Array, edges: Array) -> Array:
+    """Mean second derivative (n,) [1/s²] of an encoder over each block; NaN where too few readings
+    tell.
+
+    time [s], values (m,) in order of time; edges (n + 1,) [s]. The slope at the block's end less
+    that at its beginning, each by a line over half a block to either side, longer where the slope
+    is steady: what changes within a block or two is smeared over no more.
+    """
+    middle, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    about = np.concatenate(([middle[0] - width[0]], middle, [middle[-1] + width[-1]]))
+    bend: Array = np.diff(block_slope(time, values, about, quick=0).rate) / width
+    return bend
 
 
 def _block_lines(time: Array, values: Array, edges: Array, reach: int) -> tuple[Slopes, Array]:

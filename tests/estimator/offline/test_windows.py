@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.estimator.offline.windows import block_mean, block_slope, lines, members
+from gritd.estimator.offline.windows import block_bend, block_mean, block_slope, lines, members
 
 EDGES = np.arange(0.0, 5.05, 0.1)
 
@@ -55,6 +55,15 @@ def test_a_steady_speed_is_averaged_longer_than_a_step() -> None:
     assert np.std(speed[3:18]) < 5e-6
     assert speed[22] == pytest.approx(0.01, rel=0.01)
     assert speed[27] == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_short_ramp_of_a_speed_keeps_its_height() -> None:
+    """Its acceleration is that of each interval, as an analogue channel's mean is."""
+    time = np.arange(0.0, 5.0, 0.004)
+    speed = 0.2 * np.clip((time - 2.0) / 0.5, 0.0, 1.0)
+    bend = block_bend(time, np.cumsum(speed) * 0.004, EDGES)
+    np.testing.assert_allclose(bend[21:24], 0.4, rtol=0.02)
+    np.testing.assert_allclose(np.concatenate((bend[:19], bend[26:])), 0.0, atol=0.01)
 
 
 def test_a_silence_is_not_bridged() -> None:

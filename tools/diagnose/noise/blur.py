@@ -14,7 +14,8 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     and recording go through the same filter.
 
     Averaging takes a share of the second difference, a value's or its neighbours'; and a lagging
-    axle shifts all forces by the share by which the sinkage changes within the lag.
+    axle shifts all forces by the share by which the sinkage changes within the lag. While the motor
+    stands idle nothing changes, next to a start neither.
     """
     if stack.rig.filtered:
         return np.zeros(stack.size)
@@ -27,6 +28,7 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
 
     bent = TUNING.noise.bend * _nearby(np.where(edge, 0.0, bend))
     blur = np.hypot(bent, TUNING.noise.lag * _nearby(late))
+    blur = np.where(stack.idle & (stack.covariate("speed") == 0.0), 0.0, blur)
     return np.hypot(blur, _of_reversal(stack, predicted))
 
 

@@ -98,7 +98,8 @@ def estimate(
     """
     residual, cells = stack.measured - predicted, replicates.cells(stack)
     waves = standing(stack, residual, explainable, cells)
-    saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
+    whole = np.column_stack((explainable.whole, waves, _speeding(stack)))
+    saturated = Explainable(explainable.leading, whole)
 
     found = each(
         jobs,
@@ -109,6 +110,15 @@ def estimate(
     single = uncertain(stack, predicted, residual, colours, explainable.leading)
     noise = Noise(stack, colours, single, own)
     return calmer(noise, residual, saturated, cells, before, stack.idle)
+
+
+def _speeding(stack: Stack) -> Array:
+    """A column (N, 1) of what an inertia loses between two torques: few values hold it, so that
+    leading directions may lack it.
+    """
+    if not stack.rig.loss_of_drive:
+        return np.zeros((stack.size, 0))
+    return np.where(stack.of("torque"), stack.covariate("acceleration"), 0.0)[:, None]
 
 
 def estimate_of_reference(

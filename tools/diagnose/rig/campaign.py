@@ -17,9 +17,8 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.balance import Balance, part_of
 from gritd.estimator.model.forward import Carried, carried, responded
-from gritd.estimator.stages.history import rate_of
-from gritd.estimator.stages.situation import Motion, Sensed
-from gritd.estimator.terramechanics.soil import Array, Soil
+from gritd.estimator.stages.situation import Motion, Sensed, situation_of
+from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
 from gritd.tools.diagnose.tuning import TUNING
 
 T = TypeVar("T")
@@ -59,7 +58,7 @@ class Campaign:
         effects: Sequence[Effect] = (),
     ) -> None:
         self._settings, self._channels = settings, tuple(channels)
-        self._motions = [_filled(motion) for motion in motions]
+        self._motions = [_filled(motion, settings.wheel) for motion in motions]
 
         self.parts = parts_of(self._motions)
         self._joined = _joined(self._motions)
@@ -141,7 +140,7 @@ def _at_once(effect: Effect) -> bool:
     return listed is not None and isinstance(effect, listed) and not effect.by_run
 
 
-def _filled(motion: Motion) -> Motion:
+def _filled(motion: Motion, wheel: Wheel) -> Motion:
     """All fields arrays (n,), and the acceleration known: only a run itself can tell it."""
     ones = np.ones(np.size(motion.time))
     return replace(
@@ -149,7 +148,7 @@ def _filled(motion: Motion) -> Motion:
         load=motion.load * ones,
         pass_number=motion.pass_number * ones,
         start_position=motion.start_position * ones,
-        wheel_acceleration=rate_of(motion.time, motion.wheel_speed),
+        wheel_acceleration=situation_of(motion, wheel).wheel_acceleration,
     )
 
 

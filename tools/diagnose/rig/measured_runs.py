@@ -10,14 +10,13 @@ import numpy as np
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion, situation_of
 from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
 from gritd.tools.diagnose.rig.constants import SOIL
 from gritd.tools.diagnose.rig.interface import Bools, Constant, GridRun
 from gritd.tools.diagnose.rig.recorded import Recorded, measured_of
 from gritd.tools.diagnose.rig.signals import Signals, filled
-from gritd.tools.diagnose.rig.states import states, turned_back
+from gritd.tools.diagnose.rig.states import states, turned_back, turning
 from gritd.tools.diagnose.tuning import TUNING
 
 COURSE = ("wheel_angle", "position", "time", "acceleration", "heat")
@@ -60,6 +59,8 @@ def _measured_run(data: Recorded, number: int, settings: Settings, sinkage: Arra
     alone = np.zeros(driving.size, bool) if idle is None else idle
     if idle is not None:
         still["axle_torque"] = driving | idle
+    if idle is not None and not data.tabled:  # what is lost needs no soil that has settled
+        still["torque"] |= turning(motion, settings)
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
@@ -89,7 +90,7 @@ def covariates(
         "rolled": np.cumsum(np.abs(np.diff(angle, prepend=angle[0]))),
         "position": np.asarray(situation.position),
         "time": np.asarray(motion.time),
-        "acceleration": rate_of(motion.time, motion.wheel_speed),
+        "acceleration": np.asarray(situation.wheel_acceleration),
         "heat": np.cumsum(current**2) * step,
         "direction": np.asarray(situation.direction),
         "pass": motion.pass_number * ones,

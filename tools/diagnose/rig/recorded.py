@@ -150,6 +150,7 @@ def motion_of(signals: Signals, weights: Array, settings: Settings, began: float
         time=signals.time + began,
         wheel_angle=filled(signals.wheel_angle),
         wheel_speed=np.where(rest, 0.0, wheel_speed),
+        wheel_acceleration=filled(signals.wheel_acceleration),
         carriage_position=travel - travel[0],
         carriage_speed=np.where(rest, 0.0, carriage_speed),
         load=weights,

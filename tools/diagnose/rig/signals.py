@@ -19,7 +19,7 @@ from gritd.estimator.config.settings import Calibration, Channel, Settings
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.gaps import edges_of
 from gritd.estimator.offline.streams import RAW
-from gritd.estimator.offline.windows import Slopes, block_mean, block_slope
+from gritd.estimator.offline.windows import Slopes, block_bend, block_mean, block_slope
 from gritd.estimator.recording.mcapfile import RecordingError, opened
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.terramechanics.soil import Array
@@ -41,6 +41,7 @@ class Signals:
     time: Array  # [s] middle of each interval
     wheel_angle: Array  # [rad]
     wheel_speed: Array  # [rad/s]
+    wheel_acceleration: Array  # [rad/s²] mean of each interval, as the analogue channels are
     carriage_angle: Array
     carriage_rate: Array  # [rad/s] of the pulley
     # relative standard deviation of the ratio of both speeds, of what the encoders' counts leave of
@@ -156,6 +157,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         float(edges[0]),
         0.5 * (edges[1:] + edges[:-1]) - edges[0],
         *wheel[:2],
+        block_bend(*encoders[0], edges),
         *carriage[:2],
         doubt(wheel, carriage),
         {name: values for name, values in analogue.items() if np.isfinite(values).any()},

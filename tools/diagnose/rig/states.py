@@ -43,6 +43,13 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     return driving, resting, spinning
 
 
+def turning(motion: Motion, settings: Settings) -> Bools:
+    """Where the wheel turns one way throughout an interval and its neighbours, settled or not
+    (n,).
+    """
+    return _inside(_way(settings.wheel.radius * np.asarray(motion.wheel_speed)), 1, 1)
+
+
 def turned_back(motion: Motion, settings: Settings) -> Bools:
     """Where the wheel turns the other way than before, settled or not (n,): play of the drive shows
     there alone.

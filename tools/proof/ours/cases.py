@@ -17,7 +17,7 @@ from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.offline.windows import block_mean, block_slope
+from gritd.estimator.offline.windows import block_bend, block_mean, block_slope
 from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
@@ -264,6 +264,7 @@ def _recorded(
         float(edges[0]),
         middle,
         *wheel[:2],
+        block_bend(time, angle, edges),
         *carriage[:2],
         doubt(wheel, carriage),
         analogue,

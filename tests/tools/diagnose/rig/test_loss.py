@@ -160,3 +160,10 @@ def test_play_shows_in_the_few_values_after_a_reversal() -> None:
         wheel_rig(record(plan(reverse=True), (make("backlash", {"gap": 0.05}),)), settings())
     )
     assert [h.effect for h in found.hypotheses if h.accepted] == ["backlash"], found.summary
+
+
+def test_an_inertia_shows_where_the_wheel_starts() -> None:
+    """Soil has not settled then, but the loss between two torques needs none."""
+    inertia = (make("wheel_inertia", {"inertia": 0.6}),)
+    found = diagnose(wheel_rig(record(plan(speeds=(0.03, 0.03, 0.03)), inertia), settings()))
+    assert [h.effect for h in found.hypotheses if h.accepted] == ["wheel_inertia"], found.summary

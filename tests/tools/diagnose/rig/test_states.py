@@ -9,7 +9,7 @@ import numpy as np
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
-from gritd.tools.diagnose.rig.states import states, turned_back
+from gritd.tools.diagnose.rig.states import states, turned_back, turning
 from gritd.tools.diagnose.tuning import TUNING
 from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 
@@ -83,3 +83,10 @@ def test_a_wheel_turns_back_where_it_turned_the_other_way_before() -> None:
     stretches = [bool(part[2:-2].all()) for part in np.split(back, 7)]
     assert stretches == [False, False, False, True, False, False, True]
     assert not back[speed == 0.0].any()
+
+
+def test_a_wheel_that_speeds_up_turns_and_one_that_starts_or_stops_does_not() -> None:
+    speed = np.concatenate((np.zeros(20), np.linspace(0.0, SPEED, 20), np.zeros(20)))
+    turns = turning(_motion(speed), settings())
+    assert turns[23:38].all()
+    assert not turns[:21].any() and not turns[39:].any()

@@ -98,12 +98,12 @@ def estimate(
     """
     residual, cells = stack.measured - predicted, replicates.cells(stack)
     waves = standing(stack, residual, explainable, cells)
-    whole = np.column_stack((explainable.whole, waves, _speeding(stack)))
-    saturated = Explainable(explainable.leading, whole)
+    saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
 
+    rows = ~stack.idle & ~_speeding(stack)
     found = each(
         jobs,
-        lambda channel: _colour_of(stack, channel, residual, saturated, cells, before, ~stack.idle),
+        lambda channel: _colour_of(stack, channel, residual, saturated, cells, before, rows),
         stack.rig.channels,
     )
     colours, own = tuple(found), replicates.own_columns(stack, residual, found)
@@ -112,13 +112,17 @@ def estimate(
     return calmer(noise, residual, saturated, cells, before, stack.idle)
 
 
-def _speeding(stack: Stack) -> Array:
-    """A column (N, 1) of what an inertia loses between two torques: few values hold it, so that
-    leading directions may lack it.
+def _speeding(stack: Stack) -> Bools:
+    """Values (N,) of what is lost between two torques at which the wheel speeds up or slows down
+    more than usual: an inertia acts there, and hardly elsewhere.
     """
-    if not stack.rig.loss_of_drive:
-        return np.zeros((stack.size, 0))
-    return np.where(stack.of("torque"), stack.covariate("acceleration"), 0.0)[:, None]
+    speeding = np.zeros(stack.size, bool)
+    if stack.rig.loss_of_drive:
+        lost = stack.of("torque") & ~stack.idle
+        rate = np.abs(stack.covariate("acceleration"))
+        usual = float(np.median(rate[lost])) if lost.any() else 0.0
+        speeding[lost] = rate[lost] > TUNING.rig.doubt * NORMAL * usual
+    return speeding
 
 
 def estimate_of_reference(

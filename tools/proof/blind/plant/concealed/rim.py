@@ -11,7 +11,7 @@ from gritd.tools.proof.blind.plant.contact import Rim
 from gritd.tools.proof.blind.plant.effect import Facts, PlantEffect
 from gritd.tools.proof.blind.plant.scene import Scene
 
-USUAL, SLOWEST = 0.02, 1e-3  # [m/s] speed at which the soil was measured; keeps rest finite
+USUAL = 0.02  # [m/s] speed at which the soil was measured
 
 
 @dataclass(frozen=True)
@@ -31,17 +31,27 @@ class ThermalRate(PlantEffect):
 
 
 @dataclass(frozen=True)
-class PowerRate(PlantEffect):
-    """Strength times (u/v₀)^m, u the speed at which the rim slides on the soil.
+class InertialRate(PlantEffect):
+    """Strength times 1 + s (I − 1)/(I + 1): grains that are sheared fast and pressed lightly rub
+    more. I = (u/u₀) √(W₀/W), u the speed at which the rim slides on the soil, u₀ = 6 mm/s.
 
-    Source: power law of vane tests, Biscontin and Pestana (2001), Geotech. Testing J. 24, 423-429.
+    Source: friction of granular flow over its inertial number, Jop, Forterre, Pouliquen (2006),
+    Nature 441, 727-730.
     """
 
-    name, most = "rate_dependent_shear", 0.08
+    weight: float = 60.0  # W₀ [N]
+
+    name, most = "rate_dependent_shear", 0.2
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, facts.weight)
 
     def contact(self, rim: Rim, scene: Scene) -> Rim:
-        sliding = np.abs(scene.rim_speed - scene.motion.speed) + SLOWEST
-        growth = (sliding / (0.3 * USUAL + SLOWEST)) ** self.strength
+        sliding = np.abs(scene.rim_speed - scene.motion.speed) / (0.3 * USUAL)
+        pressed = np.maximum(scene.motion.weight, 0.1 * self.weight) / self.weight
+        inertial = sliding / np.sqrt(pressed)
+        growth = 1.0 + self.strength * (inertial - 1.0) / (inertial + 1.0)
         return replace(rim, strength=rim.strength * growth)
 
 
@@ -61,7 +71,7 @@ class SharedRebound(PlantEffect):
 
 @dataclass(frozen=True)
 class LoosenedRebound(PlantEffect):
-    """κ e^(−i/i₀) (W₀/W)^0.3: sheared soil springs back less, and so does deeply pressed soil.
+    """κ (W₀/W)^0.3/(1 + (i/i₀)²): sheared soil springs back less, and so does deeply pressed soil.
 
     Source: unloading of pressed soil is stiffer the deeper it was pressed, Wong (2008), Theory of
     Ground Vehicles, 4th ed., section 2.4.2; the fall with slip was chosen here.
@@ -78,7 +88,7 @@ class LoosenedRebound(PlantEffect):
 
     def contact(self, rim: Rim, scene: Scene) -> Rim:
         pressed = (self.weight / np.maximum(scene.motion.weight, 0.1 * self.weight)) ** 0.3
-        loosened = np.exp(-np.clip(scene.slip, 0.0, 1.0) / self.slip)
+        loosened = 1.0 / (1.0 + (np.clip(scene.slip, 0.0, 1.0) / self.slip) ** 2)
         return replace(rim, rebound=rim.rebound + self.strength * loosened * pressed)
 
 
@@ -210,7 +220,7 @@ class FrictionCircle(PlantEffect):
 
 EFFECTS: tuple[type[PlantEffect], ...] = (
     ThermalRate,
-    PowerRate,
+    InertialRate,
     SharedRebound,
     LoosenedRebound,
     RoundHump,

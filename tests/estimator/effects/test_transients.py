@@ -17,7 +17,7 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.history import followed, relaxed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.campaign import Campaign
+from gritd.tools.diagnose.rig.campaign import Campaign, Driven
 from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, typical
 
 RATE = 50.0  # [Hz]
@@ -204,10 +204,12 @@ def test_runs_in_one_array_do_not_touch(name: str) -> None:
     motions = [replace(m, load=np.asarray(m.load)) for m in campaign(2, reversing=True)]
     effect, channels = typical(EFFECTS[name]), ("torque", "sinkage", "drawbar_pull", "load")
     ones = np.ones(sum(np.size(m.time) for m in motions))
-    together = Campaign(motions, settings, channels, SOIL).readings(SOIL, ones, 1.0, (effect,))
+    together = Campaign(motions, settings, channels, SOIL).readings(
+        Driven(SOIL, ones, 1.0, (effect,))
+    )
     apart = [
         Campaign([m], settings, channels, SOIL).readings(
-            SOIL, np.ones(np.size(m.time)), 1.0, (effect,)
+            Driven(SOIL, np.ones(np.size(m.time)), 1.0, (effect,))
         )
         for m in motions
     ]
@@ -224,11 +226,11 @@ def test_readings_do_not_depend_on_what_was_read_before(name: str) -> None:
     ones = np.ones(sum(np.size(m.time) for m in motions))
     whole = Campaign(motions, settings, channels, SOIL)
     for before in ((), (typical(EFFECTS["slip_sinkage"]),), (typical(EFFECTS["sensor_drift"]),)):
-        whole.readings(SOIL, ones, 1.0, before)
+        whole.readings(Driven(SOIL, ones, 1.0, before))
 
-    effects = (typical(EFFECTS[name]),)
-    fresh = Campaign(motions, settings, channels, SOIL).readings(SOIL, ones, 1.0, effects)
-    found = whole.readings(SOIL, ones, 1.0, effects)
+    driven = Driven(SOIL, ones, 1.0, (typical(EFFECTS[name]),))
+    fresh = Campaign(motions, settings, channels, SOIL).readings(driven)
+    found = whole.readings(driven)
     np.testing.assert_allclose(found, fresh, rtol=1e-8, atol=1e-9)
 
 

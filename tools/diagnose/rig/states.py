@@ -44,10 +44,10 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
 
 
 def turning(motion: Motion, settings: Settings) -> Bools:
-    """Where the wheel turns one way throughout an interval and its neighbours, settled or not
-    (n,).
+    """Where the wheel turns one way throughout an interval and two on either side, settled or not
+    (n,): a speed next to a start is a slope that holds some rest.
     """
-    return _inside(_way(settings.wheel.radius * np.asarray(motion.wheel_speed)), 1, 1)
+    return _inside(_way(settings.wheel.radius * np.asarray(motion.wheel_speed)), 2, 2)
 
 
 def turned_back(motion: Motion, settings: Settings) -> Bools:

@@ -133,13 +133,13 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
 
 @pytest.mark.long
 def test_noise_alone_has_no_change_points() -> None:
-    """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a
-    change point.
+    """A hundred campaigns without a left-out effect, noise of any size and colour: at most 5 % with
+    a change point.
     """
     settings = config.load(packaged()).settings
     alarms = 0
-    for seed in range(40):
+    for seed in range(100):
         drawn = draw(settings, np.random.default_rng(seed))
         screening = prepared(wheel_rig(record(drawn, ()), drawn.settings))
         alarms += any(place.changes for place in locate(screening, screening.base))
-    assert alarms <= 2
+    assert alarms <= 5

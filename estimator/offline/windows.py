@@ -204,7 +204,7 @@ def _block_lines(time: Array, values: Array, edges: Array, reach: int) -> tuple[
         left = np.sqrt(np.maximum(y2 - y0 * y0 / s0 - rate * (y1 - s1 * y0 / s0), 0.0) / s0)
         scatter = left / np.sqrt(spread)
 
-    enough = s0 >= LEAST * np.median(s0)
+    enough = (s0 > 1.0) & (s0 >= LEAST * np.median(s0))  # one reading has no slope
     columns = (np.where(enough, x, np.nan) for x in (at, rate, scatter))
     return Slopes(*columns), np.where(enough, left, 0.0)
 

@@ -66,6 +66,14 @@ def test_a_short_ramp_of_a_speed_keeps_its_height() -> None:
     np.testing.assert_allclose(np.concatenate((bend[:19], bend[26:])), 0.0, atol=0.01)
 
 
+@pytest.mark.filterwarnings("error")
+def test_one_reading_a_block_tells_no_acceleration_of_its_own() -> None:
+    """A slow log of a steady speed: no step is seen, and none is made of rounding."""
+    time = np.arange(0.05, 5.0, 0.1)
+    bend = block_bend(time, np.round(0.01 * time, 6), EDGES)
+    np.testing.assert_allclose(bend[np.isfinite(bend)], 0.0, atol=1e-4)
+
+
 def test_a_silence_is_not_bridged() -> None:
     time = np.concatenate([np.arange(0.0, 2.0, 0.004), np.arange(3.0, 5.0, 0.004)])
     mean = block_mean(time, np.ones(time.size), EDGES)

@@ -219,6 +219,7 @@ def true_integrals(
             mobilisation=law.mobilisation,
             side_slip=law.side_slip,
             by_sliding=law.by_sliding,
+            across=law.across,
             order=ORDER,
         )
 

@@ -64,6 +64,7 @@ def rim_forces(
         mobilisation=law.mobilisation,
         side_slip=law.side_slip,
         by_sliding=law.by_sliding,
+        across=law.across,
         order=order,
     )
 
@@ -233,6 +234,7 @@ def _take(contact: Contact, index: slice | Index) -> Contact:
             _at(law.friction, index),
             _at(law.side_slip, index),
             law.by_sliding,
+            law.across,
             law.mobilisation,
         ),
         _at(contact.slip, index),

@@ -119,6 +119,7 @@ class ContactLaw:
     friction: Scalar = 1.0  # factor on tan φ alone [-]
     side_slip: Scalar = 0.0  # tangent of the angle between wheel and travel [-]
     by_sliding: float = 0.0  # share in which shear stress has the direction of the sliding
+    across: float = 1.0  # shear modulus along the wheel over that across it [-]
     mobilisation: Mobilisation = janosi  # share of the strength mobilised at j/k
 
 

@@ -147,13 +147,15 @@ def contact(
     mobilisation: Mobilisation = janosi,
     side_slip: Scalar = 0.0,
     by_sliding: float = 0.0,
+    across: float = 1.0,
     order: int = ORDER,
 ) -> ContactStresses:
     """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones. θₘ
     follows (5) unless given; θ₂ is 0 as in the paper.
 
     Under a wheel that slides sideways the shear stress has the direction of the displacement j of
-    the soil; by_sliding: share in which it has that of the sliding of the rim instead.
+    the soil; by_sliding: share in which it has that of the sliding of the rim instead; across: the
+    shear modulus along the wheel over that across it.
     """
     peak = _peak(wheel, slip, theta_1) if theta_m is None else theta_m
     shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
@@ -169,14 +171,14 @@ def contact(
         tau = shear_stress(soil, sigma, displacement, mobilisation)
         return ContactStresses(points, weight, sigma, tau, np.zeros_like(tau))
 
-    lateral = lateral_displacement(wheel, slip, points, side_slip)
+    lateral = across * lateral_displacement(wheel, slip, points, side_slip)
     tau = shear_stress(soil, sigma, np.hypot(displacement, lateral), mobilisation)
-    along, across = _direction(displacement, lateral)
+    x, y = _direction(displacement, lateral)
     if by_sliding:
         ratio = velocity_ratio(slip)
         s_x, s_y = _direction(1.0 - ratio * points.cosine, ratio * side_slip)
-        along, across = along + by_sliding * (s_x - along), across + by_sliding * (s_y - across)
-    return ContactStresses(points, weight, sigma, tau * along, tau * across)
+        x, y = x + by_sliding * (s_x - x), y + by_sliding * (s_y - y)
+    return ContactStresses(points, weight, sigma, tau * x, tau * y)
 
 
 def _direction(x: Array, y: Array) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from gritd.tools.diagnose.rig.interface import FormSource, GridRun
 SOURCES = (  # name, channels that share one discrepancy, whether it turns with the direction
     ("torque", ("torque", "axle_torque"), True),
     ("drawbar_pull", ("drawbar_pull",), True),
-    ("side_force", ("side_force",), True),
     ("sinkage", ("sinkage",), False),
 )
 

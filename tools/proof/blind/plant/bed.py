@@ -57,7 +57,7 @@ def _carried(scene: Scene, weight: Array, damped: bool) -> Scene:
         carried=np.where(down, felt.load if damped else weight, 0.0),
         torque=felt.torque * sign,
         pull=felt.pull * sign,
-        side=felt.side * scene.moving * down,
+        side=felt.side * sign,
     )
 
 

@@ -42,6 +42,11 @@ class Rim:
     sliding: Array | float = 0.0  # by how much the rim slides before the soil's strength is reached
     skew: Array | float = 0.0  # tangent of the angle from the wheel's plane to its travel
 
+    @property
+    def along(self) -> Array | float:
+        """The share of the travel that is along the wheel's plane: the cosine of that angle."""
+        return 1.0 / np.hypot(1.0, self.skew)
+
 
 Sampled = TypeVar("Sampled", PlantSoil, Rim)
 
@@ -97,7 +102,7 @@ def reaction(
     theta_1 = np.maximum(theta_1, 1e-6)
     zones = _zones(rim, theta_1)
     ground, held = columned(ground), columned(rim)
-    parts = [_zone(ground, held, radius, ratio, zone) for zone in zones]
+    parts = [_zone(ground, held, radius, ratio * rim.along, zone) for zone in zones]
     along, down, turning, pressing, across = (a + b for a, b in zip(*parts, strict=True))
 
     arc = theta_1 + exit_angle(rim, theta_1)

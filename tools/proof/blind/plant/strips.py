@@ -154,8 +154,9 @@ class _Strips:
         near = np.abs(ahead) < REACH * self._radius
 
         flat = index + self._lane
-        slid = now.rolled - now.moved * cosine
-        skewed = Sliding(slid, np.abs(now.moved) * now.rim.skew + np.zeros_like(slid))
+        moved = now.moved * now.rim.along
+        slid = now.rolled - moved * cosine
+        skewed = Sliding(slid, moved * now.rim.skew + np.zeros_like(slid))
         return Under(
             flat=flat,
             above=np.where(near, self._radius * (1.0 - cosine), 1.0),

@@ -187,8 +187,9 @@ class SlidingRim(PlantEffect):
 
 @dataclass(frozen=True)
 class SkewedWheel(PlantEffect):
-    """The wheel's plane is turned from its travel by β: the rim slides sideways, too, and the shear
-    stress has the direction of the sliding. See `contact.sheared`.
+    """The wheel's plane is turned by β from the rails on which it travels: the rim slides sideways,
+    too, v cos β is left along the plane, and the shear stress has the direction of the sliding. See
+    `contact.sheared`.
     """
 
     name, signed, most = "side_slip", True, 0.35
@@ -212,7 +213,7 @@ class FrictionCircle(PlantEffect):
         lost = (1.0 - float(np.sqrt(1.0 - share**2))) * scene.torque
         return replace(
             scene,
-            side=scene.side + 0.7 * share * scene.carried * scene.moving,
+            side=scene.side + 0.7 * share * scene.carried * scene.moving * scene.direction,
             torque=scene.torque - lost,
             pull=scene.pull - lost / scene.rig.radius,
         )

@@ -31,7 +31,8 @@ def form_terms(stack: Stack, noise: Noise) -> tuple[RandomEffect, ...]:
     for source in stack.rig.forms:
         columns = _columns(stack, source)
         if columns.shape[1]:
-            sizes = _drive_sizes() if source.drive else form_sizes()
+            lost = source.drive and stack.rig.loss_of_drive
+            sizes = _drive_sizes() if lost else form_sizes()
             terms.append(
                 random_effect(source.name, columns, noise, sizes, of_form=not source.drive)
             )
@@ -92,7 +93,10 @@ def of_differences(stack: Stack) -> Array:
 def _columns(stack: Stack, source: FormSource) -> Array:
     """δ of one source (N, m), for a size of 1: as large as the channel itself."""
     columns = _smooth(stack, source)
-    return _without_levels(columns, _weight(stack, source)) if source.drive else columns
+    if not source.drive:
+        return columns
+    weight = _weight(stack, source)
+    return _without(columns, np.column_stack((weight, np.sign(weight), stack.named)))
 
 
 def _weight(stack: Stack, source: FormSource) -> Array:
@@ -143,13 +147,12 @@ def _features(stack: Stack, source: FormSource, acting: Bools) -> Array:
     return known[source.name]
 
 
-def _without_levels(columns: Array, weight: Array) -> Array:
-    """Columns (N, m) without what is constant or goes with the load: a drive's friction has names,
-    and a discrepancy that could be all of it would take their part (Plumlee 2017, J. Am. Stat.
-    Assoc. 112, 1274-1285).
+def _without(columns: Array, named: Array) -> Array:
+    """Columns (N, m) without what has a name (N, n), as what is constant or goes with the load: a
+    discrepancy that could be all of a drive's friction would take its part (Plumlee 2017, J. Am.
+    Stat. Assoc. 112, 1274-1285).
     """
-    levels = np.column_stack((weight, np.sign(weight)))
-    return np.asarray(columns - levels @ np.linalg.lstsq(levels, columns, rcond=None)[0])
+    return np.asarray(columns - named @ np.linalg.lstsq(named, columns, rcond=None)[0])
 
 
 def conditions_at(stack: Stack, source: FormSource) -> Array:

@@ -16,7 +16,8 @@ same all along, so what is not of the drive may also vary with the place, in wav
 down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how a zero
 creeps, or how it is set before each run: it may follow any smooth function, of up to twice the
 size of our formula. What the parameters of the model's effects can do is taken out of all this,
-so that a strength is what its effect does on the whole. ρ is how far published forms differ; its
+so that a strength is what its effect does on the whole; so is what the constants of a drive without
+soil can do. ρ is how far published forms differ; its
 prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
 never reported as if it were exact: where the soil can absorb most of an effect, another form of it
 changes the soil and hardly the fit.
@@ -101,8 +102,9 @@ def _forms_of(
     if not acting:
         return ()
     functions, places = shares(stack, np.ones(stack.size, bool)), along_place(stack)
+    named = np.column_stack((fitted.raw[:, own], stack.named))
     return tuple(
-        random_effect(one.effect.name, _beside(noise, columns, fitted, own), noise, sizes, least)
+        random_effect(one.effect.name, _beside(noise, columns, named), noise, sizes, least)
         for one in acting
         if np.any(one.added)
         for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places)
@@ -227,11 +229,10 @@ def _where_most(stack: Stack, noise: Noise, added: Array) -> Array:
     return np.where(stack.of(max(shown, key=lambda c: shown[c])), added, 0.0)
 
 
-def _beside(noise: Noise, columns: Array, fitted: Fitted, own: Index) -> Array:
-    """Columns (N, m) without what the effects' parameters, unknowns `own` of a fit, can do."""
-    whitened = whiten(noise, columns)
-    share = np.linalg.lstsq(fitted.own[:, own], whitened, rcond=DEPENDENT)[0]
-    return np.asarray(columns - fitted.raw[:, own] @ share)
+def _beside(noise: Noise, columns: Array, named: Array) -> Array:
+    """Columns (N, m) without what has a name (N, n): parameters of the fit's effects and others."""
+    share = np.linalg.lstsq(whiten(noise, named), whiten(noise, columns), rcond=DEPENDENT)[0]
+    return np.asarray(columns - named @ share)
 
 
 def _by_channel(stack: Stack, added: Array) -> Array:

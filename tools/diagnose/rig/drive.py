@@ -1,5 +1,5 @@
-"""The adapter for a motor drive without soil: T = J dω/dt + B ω, and whatever of the library acts
-on a drivetrain.
+"""The adapter for a motor drive without soil: T = J dω/dt + B ω + G sin θ + H cos θ, G and H of a
+weight that hangs on it, and whatever of the library acts on a drivetrain.
 
 Position is low-passed and differentiated on a fine grid, the model evaluated there, and prediction
 and measured torque low-passed and thinned alike, so that neither noise of the acceleration nor a
@@ -31,7 +31,7 @@ from gritd.estimator.terramechanics.soil import Array, Wheel
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.rig.constants import UNITS as WHEEL_UNITS
 from gritd.tools.diagnose.rig.constants import of_channel
-from gritd.tools.diagnose.rig.interface import Constant, GridRun, Near, Rig, RigWords
+from gritd.tools.diagnose.rig.interface import Constant, FormSource, GridRun, Near, Rig, RigWords
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.tuning import TUNING
@@ -44,10 +44,13 @@ EFFECTS_OF_A_DRIVE = (
 OF_SOIL = (
     "cohesion", "tan_phi", "shear_modulus", "sinkage", "carried", "theta_1", "drawbar_pull",
 )  # fmt: skip
-CAVEAT = "A drive without soil: inertia and viscous friction are the base model."
+CAVEAT = "A drive without soil: inertia, viscous friction and a hanging weight are the base model."
 SMOOTH = (
     ("speed",), ("velocity",), ("acceleration",), ("wheel_angle",), ("velocity", "acceleration"),
 )  # fmt: skip
+MOVED = ("wheel_angle", "velocity", "acceleration")
+LOADS = 4  # of the constants are torques in proportion to something
+NAMED = ("constant", "direction", "velocity", "acceleration")  # what is fitted, or has a name
 UNITS = WHEEL_UNITS | {"speed": "rad/s", "position": "rad"}
 
 
@@ -62,8 +65,9 @@ def drive_rig(
     usual = float(np.median(speed[speed > TUNING.rig.creep * speed.max()]))
 
     model = DriveModel(motions, _constants(motions, unit), unit, usual)
+    runs = [_run(m, n, usual) for m, n in zip(motions, names, strict=True)]
     return Rig(
-        runs=[_run(m, n, usual) for m, n in zip(motions, names, strict=True)],
+        runs=runs,
         channels=("torque",),
         units=UNITS,
         constants=model.constants,
@@ -72,6 +76,10 @@ def drive_rig(
         predict=model.predict,
         words=RigWords((CAVEAT,), replace(MENU, driven=())),
         smooth=SMOOTH,
+        forms=(_form(runs),),
+        named=[
+            [{"torque": r.covariates[n] * (r.covariates["speed"] > 0)} for r in runs] for n in NAMED
+        ],
         heated=("torque",),
         filtered=True,
         unit_factors={"rad/s": usual, "N·m": unit, "A": unit / constant},
@@ -87,8 +95,22 @@ def _constants(motions: Sequence[DriveMotion], unit: float) -> tuple[Constant, .
     return (
         Constant("inertia", 0.0, most / _size(m.acceleration for m in motions), "kg·m²"),
         Constant("damping", 0.0, most / _size(m.velocity for m in motions), "N·m·s/rad"),
+        Constant("weight_sin", 0.0, most / _size(m.hanging[0] for m in motions), "N·m"),
+        Constant("weight_cos", 0.0, most / _size(m.hanging[1] for m in motions), "N·m"),
         of_channel("torque", "delay", apart, "s"),
         of_channel("torque", "blur", apart**2, "s²"),
+    )
+
+
+def _form(runs: Sequence[GridRun]) -> FormSource:
+    """Where inertia and friction may not be all: what turns with the drive has a weight and another
+    load, so the rest is a smooth function of where it stands and how it moves.
+    """
+    spread = {n: _size(r.covariates[n] - r.covariates[n].mean() for r in runs) for n in MOVED}
+    conditions = [np.column_stack([r.covariates[n] / spread[n] for n in MOVED]) for r in runs]
+    turning = [np.where(r.covariates["speed"] > 0.0, 1.0, 0.0) for r in runs]
+    return FormSource(
+        "drive", ("torque",), tuple(conditions), tuple(turning), drive=True, signed=False
     )
 
 
@@ -109,17 +131,15 @@ class DriveModel:
         near: Near | None = None,
     ) -> list[dict[str, Array]]:
         """Motor torque [N·m]: see interface.Predict."""
-        inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
-        inertia, damping = inertia / self.unit, damping / self.unit
-        torques = [(m, self._torque(m, inertia, damping, effects)) for m in self.motions]
+        known = [k.of(float(x)) for k, x in zip(self.constants, u, strict=True)]
+        loads, timing = np.array(known[:LOADS]) / self.unit, known[LOADS:]
+        torques = [(m, self._torque(m, loads, effects)) for m in self.motions]
         return [{"torque": m.compared(_timed(t, m.step, *timing))} for m, t in torques]
 
-    def _torque(
-        self, motion: DriveMotion, inertia: float, damping: float, effects: Sequence[Effect]
-    ) -> Array:
-        """As the current tells it, on the fine grid [N·m]."""
+    def _torque(self, motion: DriveMotion, loads: Array, effects: Sequence[Effect]) -> Array:
+        """As the current tells it, on the fine grid [N·m]. loads: the first constants (l,)."""
         zero = np.zeros(motion.time.size)
-        torque = inertia * motion.acceleration + damping * motion.velocity
+        torque = loads @ np.stack((motion.acceleration, motion.velocity, *motion.hanging))
         turning = Motion(
             motion.time,
             motion.angle,
@@ -180,6 +200,15 @@ class DriveMotion:
     velocity: Array
     acceleration: Array
     torque: Array  # [N·m]
+
+    @property
+    def hanging(self) -> Array:
+        """Torque of a weight that hangs on the drive, for 1 N·m (2, n): what of it changes as the
+        drive turns. What does not is an offset.
+        """
+        turned = self.angle - self.angle.mean()
+        both = np.stack((np.sin(turned), np.cos(turned)))
+        return np.asarray(both - both.mean(axis=1, keepdims=True))
 
     @property
     def every(self) -> int:

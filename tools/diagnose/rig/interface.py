@@ -240,6 +240,8 @@ class Rig:
     stated_noise: standard deviation of one reading of a channel as the configuration states it.
     unit_factors: from a parameter of the library in such a unit to what it means for this rig.
     motion_sigma: per run, standard deviation of a prediction by what is left open of the motion.
+    named:      what the constants and offsets of a drive without soil amount to, each per run in
+        every channel: what may be off without a name has no part in these.
     nuisances:  what every fit may be off by, each per run in every channel, one standard deviation:
         unrest of a speed that is noise of the sensor, waves of a bed that was prepared anew.
     """
@@ -269,6 +271,7 @@ class Rig:
     stated_noise: Mapping[str, float] = field(default_factory=dict)
     unit_factors: Mapping[str, float] = field(default_factory=dict)
     motion_sigma: Sequence[Channels] = ()
+    named: Sequence[Sequence[Channels]] = ()
     nuisances: Sequence[Sequence[Channels]] = ()
 
     def recorded(self, channel: str) -> tuple[str, ...]:

@@ -80,6 +80,11 @@ class Stack:
         return self._columns(self.rig.nuisances)
 
     @cached_property
+    def named(self) -> Array:
+        """Columns (N, k) in the channels' units: see Rig.named; those that act."""
+        return self._columns(self.rig.named)
+
+    @cached_property
     def doubts(self) -> Array:
         """Columns (N, k) in the channels' units: see Held.doubts; those that act."""
         return self._columns(self.rig.held.doubts if self.rig.held else ())

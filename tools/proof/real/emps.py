@@ -196,7 +196,7 @@ FRICTION = Proof(
     title="EMPS, friction concealed",
     concealed="""
         A linear drive with friction, a public identification benchmark (Janot, Gautier, Brunot
-        2019). The diagnosis starts from inertia and viscous friction alone. Mass, viscous and
+        2019). The diagnosis starts without a friction but the viscous. Mass, viscous and
         Coulomb friction as published with the data judge; so does DATA_EMPS_PULSES, which the
         diagnosis does not see, by a regression of the judge's own (another filter, grid and
         derivative).

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.cli.command import CommandError
+from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.noise.blur import blur_of
 from gritd.tools.diagnose.rig.stack import Stack
 from tests.tools.diagnose.rig.drives import (
@@ -49,6 +50,21 @@ def test_reversals_count_but_a_drive_at_rest_does_not() -> None:
 def test_what_both_sides_are_filtered_by_blurs_neither() -> None:
     stack = Stack(rig(log()))
     assert not blur_of(stack, stack.measured).any()
+
+
+@pytest.mark.parametrize("hangs", [0.0, 12.0])
+def test_friction_and_offset_are_named_beside_a_load_that_nobody_stated(hangs: float) -> None:
+    """A weight on an arm, and a spring that no effect is: both go with the place alone."""
+    series = log()
+    time, position = series["wheel_encoder"]
+    load = hangs * np.sin(position + 0.4) + 60.0 * position + 200.0 * position**3
+    current = series["motor_shunt"][1] + load - 3.0
+    found = diagnose(rig(series | {"motor_shunt": (time, current)}))
+    values = {h.effect: h.parameters for h in found.hypotheses if h.accepted}
+    assert found.verdict == "explained"
+    assert set(values) == {"coulomb_friction", "current_offset"}
+    loss = values["coulomb_friction"]["loss"]
+    assert abs(loss.value - LOSS) < 2.0 * loss.sigma < LOSS
 
 
 def test_a_log_that_is_too_short_is_refused_in_one_line() -> None:

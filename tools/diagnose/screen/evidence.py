@@ -40,7 +40,7 @@ class Weighed:
     evidence: log evidence summed over the sizes of the discrepancy [nats].
     exact:    log Bayes factor beside the model without a discrepancy.
     start:    of its parameters (p,), in expected sizes, where a fit begins; sizes: of the
-        discrepancy beside which the effect is likeliest.
+        discrepancy, and of other forms of the fit's effects, beside which it is likeliest.
     """
 
     signature: Signature

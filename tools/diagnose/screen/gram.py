@@ -60,8 +60,8 @@ class Gram:
 
     def __init__(self, problem: Problem, model: Model, rows: Bools | None = None) -> None:
         """rows: marks the values (N,) that count; if not given, all."""
-        forms, others = _terms(model)
-        self._fixed = _fixed_columns(problem, model, others)
+        forms, chosen = _terms(model)
+        self._fixed = _fixed_columns(problem, model)
         self._form = joined(problem.stack.size, [f.whitened for f in forms])
         self._forms, self._residual = forms, model.fitted.residual
         if rows is not None:
@@ -79,7 +79,7 @@ class Gram:
         score = self._form.pulled(self._residual) - self._inside.T @ self._pulled
         misfit = self._residual @ self._residual + strain @ strain - self._pulled @ self._pulled
         alone = -0.5 * float(misfit) - float(np.log(np.diag(self._root)).sum())
-        self.sizes = [_sized(gram, score, alone, forms, chosen) for chosen in _about(model, forms)]
+        self.sizes = [_sized(gram, score, alone, forms, some) for some in _about(chosen, forms)]
 
     @property
     def evidence(self) -> Array:
@@ -120,25 +120,18 @@ class Gram:
         return a, b
 
 
-def _terms(model: Model) -> tuple[Sequence[RandomEffect], Sequence[tuple[RandomEffect, float]]]:
-    """Of the model's form, and other forms of its effects with their sizes; none of a plain fit."""
-    if model.marginal is None:
-        return (), ()
-    every, first = model.marginal.terms, len(model.sizes)
-    of_effects = zip(every[first:], model.chosen[first:], strict=True)
-    sized = [(f, f.sizes.values[number]) for f, number in of_effects]
-    return every[:first], [(f, size) for f, size in sized if size > 0.0]
+def _terms(model: Model) -> tuple[Sequence[RandomEffect], Chosen]:
+    """Of the model's form, then other forms of its effects, with their sizes; none of a plain
+    fit.
+    """
+    return (model.marginal.terms, model.chosen) if model.marginal is not None else ((), ())
 
 
-def _fixed_columns(
-    problem: Problem, model: Model, others: Sequence[tuple[RandomEffect, float]]
-) -> Columns:
-    """All but δ (N, q), each one standard deviation."""
+def _fixed_columns(problem: Problem, model: Model) -> Columns:
+    """What has one size (N, q), each column one standard deviation."""
     fitted = model.fitted
     own = whole(fitted.own / fitted.penalty[: fitted.centre.size])
-    allowed = [f.whitened for f in problem.fixed]
-    more = [f.whitened.scaled(size) for f, size in others]
-    return joined(problem.stack.size, (own, *allowed, *more))
+    return joined(problem.stack.size, (own, *(f.whitened for f in problem.fixed)))
 
 
 def _sized(
@@ -160,11 +153,11 @@ def _sized(
     return Sized(chosen, prior + alone + 0.5 * float(y @ y) - spread, acting, size, root, y)
 
 
-def _about(model: Model, forms: Sequence[RandomEffect]) -> list[Chosen]:
+def _about(chosen: Chosen, forms: Sequence[RandomEffect]) -> list[Chosen]:
     """Sizes that are tried: those of the fit, each varied alone, all smaller and larger by
     steps.
     """
-    chosen, counts = model.sizes[: len(forms)], [len(f.sizes.values) for f in forms]
+    counts = [len(f.sizes.values) for f in forms]
     alone = [
         (*chosen[:i], n, *chosen[i + 1 :]) for i, count in enumerate(counts) for n in range(count)
     ]

@@ -255,36 +255,44 @@ def shared(search: EffectSearch) -> list[object]:
 
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
-    """The model with one more effect, the best of its starts. Where it ends well below what linear
-    algebra foretold, the discrepancy may have taken the effect's part: it is fitted again from
-    none. Where it ends well below the model that it holds, also from there, with the effect's
-    strengths at nought.
+    """The model with one more effect, the best of its starts. Where what the effect does had driven
+    a constant to its bound, one begins with all constants as they are known. Where it ends well
+    below what linear algebra foretold, the discrepancy may have taken the effect's part: it is
+    fitted again from none. Where it ends well below the model that it holds, also from there, with
+    the effect's strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
-    begins = [(one.start, one.sizes) for one in predicted.starts]
+    begins = [(one.start, one.sizes, model.fitted.u) for one in predicted.starts]
+    if model.fitted.held[: model.fitted.u.size].any():
+        begins += [(start, sizes, 0.0 * u) for start, sizes, u in begins]
     made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
     if made.evidence > predicted.evidence - TUNING.search.little:
         return made
 
-    again = [(predicted.starts[0].start, tuple(0 for _ in model.sizes))]
+    again = [(predicted.starts[0].start, tuple(0 for _ in model.chosen), model.fitted.u)]
     if made.evidence <= model.evidence - TUNING.search.little:
         strengths = [p.role == "strength" for p in effect.parameters()]
-        again.append((np.where(strengths, 0.0, predicted.starts[0].start), model.sizes))
+        again.append(
+            (np.where(strengths, 0.0, predicted.starts[0].start), model.chosen, model.fitted.u)
+        )
     others = [_fitted_with(search, predicted, *b) for b in again]
     return max(made, *others, key=lambda m: m.evidence)
 
 
 def _fitted_with(
-    search: EffectSearch, predicted: Predicted, start: Array, sizes: tuple[int, ...]
+    search: EffectSearch, predicted: Predicted, start: Array, sizes: tuple[int, ...], u: Array
 ) -> Model:
-    """start (p,) of the effect's parameters; sizes: of the forms."""
+    """start (p,) of the effect's parameters; sizes: of all terms of the model beside it; u (q,):
+    constants.
+    """
     fitted, screening = predicted.model.fitted, search.screening
     effect = search.problem.stack.rig.effects[predicted.effect]
     effects: tuple[Maker, ...] = (*fitted.effects, effect)
     free = (*fitted.free, *_free_near(search.problem.stack.rig, predicted.effect, start))
-    begins = (fitted.u, np.concatenate((fitted.x, start)))
-    forms, errors = screening.forms, predicted.model.other_forms
-    return fit_model(screening.problem, forms, effects, free, begins, sizes, errors, fitted)
+    begins = (u, np.concatenate((fitted.x, start)))
+    forms, count = screening.forms, len(screening.forms)
+    errors = replace(predicted.model.other_forms, sizes=sizes[count:])
+    return fit_model(screening.problem, forms, effects, free, begins, sizes[:count], errors, fitted)
 
 
 def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:

@@ -104,6 +104,7 @@ def judged(
         np.array([w.evidence for w in weighed]),
         np.array([len(w.names) for w in weighed]),
         np.array([w.functions for w in weighed]),
+        np.array([_needed(w, weighed) for w in weighed]),
     )
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
@@ -130,6 +131,18 @@ def judged(
             if name not in named.names and likely(_together(every)[frozenset(best.names)])
         ),
     )
+
+
+def _needed(of: WeighedExplanation, weighed: Sequence[WeighedExplanation]) -> int:
+    """How many effects an explanation needs beside one: those of a trusted one are companions of
+    another only where some of them are trusted without the others.
+    """
+    fewer = (w for w in weighed if set(w.names) < set(of.names) and not w.functions)
+    return 0 if not _trusted(of) or any(map(_trusted, fewer)) else len(of.names) - 1
+
+
+def _trusted(of: WeighedExplanation) -> bool:
+    return bool(of.names) and all(map(likely, of.trust))
 
 
 def _accepted(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> list[str]:

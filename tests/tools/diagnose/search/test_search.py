@@ -23,6 +23,7 @@ from gritd.tools.diagnose.search import search as searching
 from gritd.tools.diagnose.search.search import (
     EffectSearch,
     Predicted,
+    _fitted_with,
     _free_near,
     _gains,
     _retested,
@@ -116,7 +117,7 @@ def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
     search = searched(make("bulldozing", {"share": 0.75}))
     alone = extended(search, [search.bare], 1, 1)
     (one,) = alone.models[2:]
-    two = _with_effect(alone, offered(one, "viscous_friction", [0.1], one.sizes))
+    two = _with_effect(alone, offered(one, "viscous_friction", [0.1], one.chosen))
     stuck = replace(one, evidence=one.evidence - 200.0)
     caught = replace(search, models=(search.base, search.bare, stuck, two))
     assert caught.best() is two
@@ -156,5 +157,6 @@ def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     assert 1 < len(predicted.starts) <= TUNING.search.again
     assert len({tuple(one.start) for one in predicted.starts}) == len(predicted.starts)
     best = _with_effect(search, predicted).evidence
-    alone = [_with_effect(search, replace(predicted, starts=(one,))) for one in predicted.starts]
+    u = search.bare.fitted.u
+    alone = [_fitted_with(search, predicted, x.start, x.sizes, u) for x in predicted.starts]
     assert best >= max(model.evidence for model in alone) - 1e-6

@@ -106,6 +106,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "may be repeated; default: all",
     )
 
+    parser.add_argument(
+        "--steering",
+        type=number(low=0.0),
+        default=0.0,
+        metavar="DEG",
+        help="steady states at this angle between the wheel and its travel; default: 0",
+    )
+
 
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """Recordings by wheel and kind, one configuration, penetration.csv. Raises RigFileError,
@@ -122,7 +130,14 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 
     for file, match in tables:
         if match[1] in wheels:
-            written += _import_table(file, match[1], args.rim_speed, args.output, configured, tell)
+            rows = _steered(file, args.steering)
+            trials = _numbered([r for r in rows if not args.rim_speed or r[0] in args.rim_speed])
+            if not trials:
+                speeds = ", ".join(f"{s:g}" for s in args.rim_speed)
+                wanted = f"rim speed {speeds} mm/s and beta {args.steering:g}"
+                raise RigFileError(f"{file}: found no row of {wanted}")
+            kind = f"{match[1]}-{args.steering:g}deg" if args.steering else match[1]
+            written += _import_table(kind, trials, args.output, configured, tell)
 
     loads = {
         name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()
@@ -144,21 +159,13 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 
 
 def _import_table(
-    path: Path,
     wheel: str,
-    speeds: list[float],
+    trials: list[tuple[float, int, Condition]],
     output: Path,
     configured: config.Configuration,
     tell: Tell,
 ) -> list[Path]:
     """A recording of each row: it was a trial of its own, with a load of its own."""
-    trials = _numbered([row for row in _straight(path) if not speeds or row[0] in speeds])
-    if not trials:
-        raise RigFileError(
-            f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and "
-            "beta 0"
-        )
-
     written = []
     tell("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
     for speed, repeat, condition in trials:
@@ -177,14 +184,17 @@ def _import_table(
     return written
 
 
-def _straight(path: Path) -> list[tuple[float, Condition]]:
-    """Commanded rim speed and condition of each row with steering angle 0. Raises RigFileError."""
+def _steered(path: Path, angle: float) -> list[tuple[float, Condition]]:
+    """Commanded rim speed and condition of each row of one steering angle [°]. Raises
+    RigFileError.
+    """
     columns = _of_mat(path) if path.suffix == ".mat" else _of_csv(path)
-    straight = columns["beta"] == 0.0
-    chosen = {name: values[straight] for name, values in columns.items()}
+    steered = columns["beta"] == angle
+    chosen = {name: values[steered] for name, values in columns.items()}
     rows = [dict(zip(chosen, values, strict=True)) for values in zip(*chosen.values(), strict=True)]
     if not rows:
-        raise RigFileError(f"{path}: found no row with beta 0; expected straight driving")
+        angles = ", ".join(f"{beta:g}" for beta in np.unique(columns["beta"]))
+        raise RigFileError(f"{path}: found no row with beta {angle:g}; found {angles}")
     check_few(path, len(rows))
     return [(float(row["Vry"]), _condition(row)) for row in rows]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.progress import Progress
-from gritd.tools.proof.real import chrono, cmu, ding, emps, figure, mgst
+from gritd.tools.proof.real import chrono, cmu, ding, emps, figure, mgst, steered
 from gritd.tools.proof.real.bench import ROOT, CommandBench
 from gritd.tools.proof.real.page import page, section
 from gritd.tools.proof.real.proof import Finding, Proof
@@ -23,6 +23,7 @@ PROOFS: tuple[Proof, ...] = (
     mgst.DRIVETRAIN,
     mgst.SIDE_WALL,
     cmu.GROUSERS,
+    steered.STEERED,
     emps.FRICTION,
     ding.STRENGTH,
     chrono.TERRAIN,

@@ -104,6 +104,17 @@ def test_one_rim_speed_alone(tmp_path: Path) -> None:
         main(["cmu", table, "-o", str(tmp_path), "--rim-speed", "7"])
 
 
+def test_a_wheel_that_is_turned_from_its_travel(tmp_path: Path) -> None:
+    """Slip is that of the travel; the side force is its own channel."""
+    table = str(REAL / "cmu" / "smooth_all_trials_steady_state.csv")
+    chosen = ["cmu", table, "-o", str(tmp_path), "--rim-speed", "10"]
+    assert main([*chosen, "--steering", "30"]) == 0
+    first = tmp_path / "smooth-30deg-table" / "smooth-30deg-010-1.mcap"
+    assert Physical(first).force("fy").mean() == pytest.approx(9.9, abs=1.0)
+    with pytest.raises(CommandError, match="beta 20; found 0, 15, 30, 45, 60, 75, 90"):
+        main([*chosen, "--steering", "20"])
+
+
 def test_a_log_ends_where_its_table_row_says(imported: Path) -> None:
     log = Physical(imported / "smooth-logs" / "gr810_vx_10__12-7-20__10_20_0_1.mcap")
     time, z = log.time("sinkage_pot"), log.value("sinkage_pot")

@@ -13,7 +13,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.tools.commands.import_rig import main
 from gritd.tools.diagnose.rig.drive import drive_rig
 from gritd.tools.diagnose.rig.signals import drive_series
-from gritd.tools.proof.real import chrono, cmu, ding, emps, mgst
+from gritd.tools.proof.real import chrono, cmu, ding, emps, mgst, steered
 from gritd.tools.proof.real.bench import CommandBench
 from gritd.tools.proof.real.proof import Check, Finding, Proof
 from tests.real_recordings import REAL, needs
@@ -75,6 +75,14 @@ def test_cmu_predicts_the_pull_of_unseen_states_of_the_other_wheel(tmp_path: Pat
     assert checks["Is nothing said of the frame's yielding that the rigid stop denies"].met
     assert checks["Is the sinkage [mm] of unseen states predicted better"].met
     assert checks["Is the drawbar pull [N] of unseen states predicted better"].met
+
+
+@needs("cmu")
+@pytest.mark.slow
+def test_cmu_names_a_wheel_that_is_turned_from_its_travel(tmp_path: Path) -> None:
+    _, checks = proved(steered.STEERED, tmp_path)
+    for angle in steered.ANGLES:
+        assert checks[f"Which effect does it name first at {angle}°"].met
 
 
 @needs("mgst")

@@ -49,7 +49,7 @@ SMOOTH = (
     ("speed",), ("velocity",), ("acceleration",), ("wheel_angle",), ("velocity", "acceleration"),
 )  # fmt: skip
 MOVED = ("wheel_angle", "velocity", "acceleration")
-LOADS = 4  # of the constants are torques in proportion to something
+LOADS = ("inertia", "damping", "weight_sin", "weight_cos")  # torques in proportion to something
 NAMED = ("constant", "direction", "velocity", "acceleration")  # what is fitted, or has a name
 UNITS = WHEEL_UNITS | {"speed": "rad/s", "position": "rad"}
 
@@ -131,13 +131,14 @@ class DriveModel:
         near: Near | None = None,
     ) -> list[dict[str, Array]]:
         """Motor torque [N·m]: see interface.Predict."""
-        known = [k.of(float(x)) for k, x in zip(self.constants, u, strict=True)]
-        loads, timing = np.array(known[:LOADS]) / self.unit, known[LOADS:]
+        known = {k.name: k.of(float(x)) for k, x in zip(self.constants, u, strict=True)}
+        loads = np.array([known[name] for name in LOADS]) / self.unit
+        timing = known["torque_delay"], known["torque_blur"]
         torques = [(m, self._torque(m, loads, effects)) for m in self.motions]
         return [{"torque": m.compared(_timed(t, m.step, *timing))} for m, t in torques]
 
     def _torque(self, motion: DriveMotion, loads: Array, effects: Sequence[Effect]) -> Array:
-        """As the current tells it, on the fine grid [N·m]. loads: the first constants (l,)."""
+        """As the current tells it, on the fine grid [N·m]. loads: values (l,) of LOADS."""
         zero = np.zeros(motion.time.size)
         torque = loads @ np.stack((motion.acceleration, motion.velocity, *motion.hanging))
         turning = Motion(

@@ -37,7 +37,7 @@ def test_rivals_are_told_apart_by_what_they_do_differently() -> None:
 
 def test_what_is_insufficient_is_made_sufficient() -> None:
     """One short noisy run at one load: what would show most of what it cannot."""
-    found = diagnosed(plan(loads=(60.0,), seconds=6.0, wrench=False, noise=20.0, standstill=False))
+    found = diagnosed(plan(loads=(60.0,), seconds=6.0, wrench=False, noise=40.0, standstill=False))
     assert found.verdict == "insufficient"
     assert proposed(found)
 

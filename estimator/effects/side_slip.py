@@ -39,10 +39,10 @@ class SideSlip(Effect):
     digging: float = shape(
         "depth that a wheel digs that slides sideways as fast as its rim, d",
         "m",
-        mean=1e-3,
+        mean=0.0,
         sigma=5e-3,
         low=0.0,
-        high=0.06,
+        high=0.02,
     )
 
     across: float = shape(

@@ -256,14 +256,14 @@ def shared(search: EffectSearch) -> list[object]:
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
     """The model with one more effect, the best of its starts. Where what the effect does had driven
-    a constant as far as it may go, one begins with all constants as they are known. Where it ends
-    well below what linear algebra foretold, the discrepancy may have taken the effect's part: it is
+    a constant to its bound, one begins with all constants as they are known. Where it ends well
+    below what linear algebra foretold, the discrepancy may have taken the effect's part: it is
     fitted again from none. Where it ends well below the model that it holds, also from there, with
     the effect's strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
     begins = [(one.start, one.sizes, model.fitted.u) for one in predicted.starts]
-    if np.abs(model.fitted.u).max() >= TUNING.fit.far:
+    if model.fitted.held[: model.fitted.u.size].any():
         begins += [(start, sizes, 0.0 * u) for start, sizes, u in begins]
     made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
     if made.evidence > predicted.evidence - TUNING.search.little:

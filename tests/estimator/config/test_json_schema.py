@@ -22,7 +22,7 @@ from gritd.tools.dev import config_reference
 from tests.estimator.config.rig import changed
 
 VALIDATOR = jsonschema.Draft7Validator(json_schema())
-FILLED = {"where": "a hall", "source": "a table", "torque_source": "wrench"}
+FILLED = {"side_force": "", "where": "a hall", "source": "a table", "torque_source": "wrench"}
 
 
 def amiss(text: str) -> list[str]:

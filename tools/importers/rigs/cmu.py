@@ -91,6 +91,9 @@ HOURS_BEHIND = {"f-d-large-box": 5, "testbed-deflection": 4}  # of the rig's clo
 COUNTING = Counting(COUNT, COUNT, pot_scale=-1e-3, pot_offset=-START_HEIGHT * 1e-3)
 
 
+SIDE_FORCE = "\n    side_force: {offset: {value: 0 N, sigma: 0.5 N}}"  # a line of its own
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both"
@@ -109,9 +112,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steering",
         type=number(low=0.0),
-        default=0.0,
         metavar="DEG",
-        help="steady states at this angle between the wheel and its travel; default: 0",
+        help="steady states at this angle between the wheel and its travel, their side force "
+        "compared too; default: 0, without",
     )
 
 
@@ -125,18 +128,20 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         expected = "smooth_all_trials_steady_state.csv or another of those in docs/importing.md"
         raise RigFileError(f"{args.paths[0]}: found none of the rig's files; expected {expected}")
 
-    configured = configuration("rig_cmu.yaml", args.output, "cmu.yaml")
+    side = "" if args.steering is None else SIDE_FORCE
+    configured = configuration("rig_cmu.yaml", args.output, "cmu.yaml", side_force=side)
+    steering = args.steering or 0.0
     written = [args.output / "cmu.yaml"]
 
     for file, match in tables:
         if match[1] in wheels:
-            rows = _steered(file, args.steering)
+            rows = _steered(file, steering)
             trials = _numbered([r for r in rows if not args.rim_speed or r[0] in args.rim_speed])
             if not trials:
                 speeds = ", ".join(f"{s:g}" for s in args.rim_speed)
-                wanted = f"rim speed {speeds} mm/s and beta {args.steering:g}"
+                wanted = f"rim speed {speeds} mm/s and beta {steering:g}"
                 raise RigFileError(f"{file}: found no row of {wanted}")
-            kind = f"{match[1]}-{args.steering:g}deg" if args.steering else match[1]
+            kind = f"{match[1]}-{steering:g}deg" if steering else match[1]
             written += _import_table(kind, trials, args.output, configured, tell)
 
     loads = {

@@ -15,7 +15,7 @@ SPEEDS = tuple(a for speed in DRIVEN for a in ("--rim-speed", speed))
 
 
 def _run(bench: CommandBench) -> Finding:
-    straight = bench.imported("cmu", "straight", *SPEEDS, files=TABLE)
+    straight = bench.imported("cmu", "straight", *SPEEDS, "--steering", "0", files=TABLE)
     usual = sorted((straight / "smooth-table").glob("*.mcap"))
     runs, panels = [], []
     for angle in ANGLES:

@@ -21,8 +21,8 @@ class SideSlip(Effect):
     side force = r b ∫ τ_y dθ;   z + d min(1, v/rω) tan β
 
     The shear stress has the direction of the displacement j (m = 0), or of the sliding s (m = 1).
-    The soil yields sideways by another shear modulus than along the wheel, κ = k_x/k_y; in the
-    source it is about 2. Soil that a wheel carries aside digs, as that does which it carries back
+    The soil may yield sideways by another shear modulus than along the wheel, κ = k_x/k_y, as in
+    the source. Soil that a wheel carries aside digs, as that does which it carries back
     (`slip_sinkage`).
     Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, Eq. (9); Wong
     (2008), Theory of Ground Vehicles, 4th ed., ch. 1, for the sliding.

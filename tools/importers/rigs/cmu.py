@@ -89,8 +89,6 @@ PLATES = {
 HOURS_BEHIND = {"f-d-large-box": 5, "testbed-deflection": 4}  # of the rig's clock, by time of year
 
 COUNTING = Counting(COUNT, COUNT, pot_scale=-1e-3, pot_offset=-START_HEIGHT * 1e-3)
-
-
 SIDE_FORCE = "\n    side_force: {offset: {value: 0 N, sigma: 0.5 N}}"  # a line of its own
 
 
@@ -135,12 +133,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 
     for file, match in tables:
         if match[1] in wheels:
-            rows = _steered(file, steering)
-            trials = _numbered([r for r in rows if not args.rim_speed or r[0] in args.rim_speed])
-            if not trials:
-                speeds = ", ".join(f"{s:g}" for s in args.rim_speed)
-                wanted = f"rim speed {speeds} mm/s and beta {steering:g}"
-                raise RigFileError(f"{file}: found no row of {wanted}")
+            trials = _numbered(_steered(file, steering, args.rim_speed))
             kind = f"{match[1]}-{steering:g}deg" if steering else match[1]
             written += _import_table(kind, trials, args.output, configured, tell)
 
@@ -189,9 +182,9 @@ def _import_table(
     return written
 
 
-def _steered(path: Path, angle: float) -> list[tuple[float, Condition]]:
-    """Commanded rim speed and condition of each row of one steering angle [°]. Raises
-    RigFileError.
+def _steered(path: Path, angle: float, speeds: list[float]) -> list[tuple[float, Condition]]:
+    """Commanded rim speed and condition of each row of one steering angle [°] and some rim speeds
+    [mm/s], of all if none is given. Raises RigFileError.
     """
     columns = _of_mat(path) if path.suffix == ".mat" else _of_csv(path)
     steered = columns["beta"] == angle
@@ -201,7 +194,11 @@ def _steered(path: Path, angle: float) -> list[tuple[float, Condition]]:
         angles = ", ".join(f"{beta:g}" for beta in np.unique(columns["beta"]))
         raise RigFileError(f"{path}: found no row with beta {angle:g}; found {angles}")
     check_few(path, len(rows))
-    return [(float(row["Vry"]), _condition(row)) for row in rows]
+    chosen_rows = [row for row in rows if not speeds or float(row["Vry"]) in speeds]
+    if not chosen_rows:
+        wanted = ", ".join(f"{speed:g}" for speed in speeds)
+        raise RigFileError(f"{path}: found no row of rim speed {wanted} mm/s and beta {angle:g}")
+    return [(float(row["Vry"]), _condition(row)) for row in chosen_rows]
 
 
 def _of_csv(path: Path) -> dict[str, Array]:

@@ -33,12 +33,12 @@ PLATE, DEPTHS = (
 
 
 def _run(bench: CommandBench) -> Finding:
-    smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
+    smooth = bench.imported("cmu", "cmu", *speeds_of(DRIVEN), files=TABLES)
     of_smooth = list((smooth / "smooth-table").glob("*.mcap"))
     first = bench.diagnosis(of_smooth, smooth / "cmu.yaml", "cmu-smooth")
 
     fit, held = (
-        bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES)
+        bench.imported("cmu", name, "--wheel", "grouser", *speeds_of(speeds), files=TABLES)
         / "grouser-table"
         for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
     )
@@ -73,7 +73,7 @@ def _run(bench: CommandBench) -> Finding:
     )
 
 
-def _speeds(speeds: tuple[str, ...]) -> tuple[str, ...]:
+def speeds_of(speeds: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(a for speed in speeds for a in ("--rim-speed", speed))
 
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.tools.proof.real.bench import CommandBench, DiagnosisRun
-from gritd.tools.proof.real.judge import Judge
+from gritd.tools.proof.real.cmu import DRIVEN, speeds_of
+from gritd.tools.proof.real.judge import Judge, rms
 from gritd.tools.proof.real.proof import Check, FigureTable, Finding, Panel, Proof, listed
 
 TABLE = ("cmu/smooth_all_trials_steady_state.csv",)
 ANGLES = (15, 30, 45)  # [°]
-DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
-SPEEDS = tuple(a for speed in DRIVEN for a in ("--rim-speed", speed))
+SPEEDS = speeds_of(DRIVEN)
 
 
 def _run(bench: CommandBench) -> Finding:
     straight = bench.imported("cmu", "straight", *SPEEDS, "--steering", "0", files=TABLE)
     usual = sorted((straight / "smooth-table").glob("*.mcap"))
-    runs, panels = [], []
+    runs, panels, rows = [], [], []
     for angle in ANGLES:
         folder = bench.imported("cmu", f"at{angle}", *SPEEDS, "--steering", str(angle), files=TABLE)
         steered = sorted(folder.glob("*-table/*.mcap"))
@@ -33,11 +33,14 @@ def _run(bench: CommandBench) -> Finding:
         order = np.argsort(curves[0])
         labels = ("measured", "as if straight", "with what was found")
         title = f"side force at {angle}° [N]"
+        _, measured, as_straight, found = curves
+        errors = rms(as_straight - measured), rms(found - measured)
+        rows.append((f"{angle}°", *(f"{error:.2f} N" for error in errors)))
         panels.append(Panel(title, curves[:, order], "slip [–]", title, labels, points=True))
 
     checks = [c for angle, run in zip(ANGLES, runs, strict=True) for c in _checks(angle, run)]
-    rows = [(f"{a}°", _angle(r)) for a, r in zip(ANGLES, runs, strict=True)]
-    return Finding(runs, checks, FigureTable(("steered by", "found"), rows), panels)
+    heads = ("steered by", "error of the side force as if straight", "with what was found")
+    return Finding(runs, checks, FigureTable(heads, rows), panels)
 
 
 def _checks(angle: int, run: DiagnosisRun) -> list[Check]:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.terramechanics.soil import Array
@@ -22,7 +23,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST = 0.3  # share of the usual number of readings below which a block is not used
-OUTLIER = 6.0  # [σ] from the block's median: one such reading is left out
+OUTLIER = 6.0  # [σ] from the block's median and from its neighbours': such a reading is left out
+BESIDE = 5  # readings whose median is its neighbours'
 QUICK, STEADY, LONG = 1, 4, 12  # blocks to either side over which a slope is fitted
 GROWN = 1.2  # what the longest line may leave, in what short ones leave
 CALM = 4.0  # [σ] within which the two slopes are the same
@@ -126,15 +128,16 @@ def group_means(group: Ints, values: Array, n: int) -> tuple[Array, Ints]:
 def block_mean(time: Array, values: Array, edges: Array) -> Array:
     """Mean of the readings in each block (n,), moved to its middle; NaN in one with too few.
 
-    time [s], values (m,) in order of time; edges (n + 1,) [s]. Single readings far off are left
-    out.
+    time [s], values (m,) in order of time; edges (n + 1,) [s]. Single readings far off both the
+    block's median and their neighbours are left out: a step within a block is none.
     """
     n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1])
     block, (time, values) = _in_blocks(edges, time, time, values)
 
-    deviation = values - _median(block, values, n)[block]
-    scale = NORMAL * np.median(np.abs(deviation)) if deviation.size else 0.0
-    kept = np.abs(deviation) <= OUTLIER * scale if scale > 0.0 else np.ones(block.size, bool)
+    off = np.abs(values - _median(block, values, n)[block])
+    scale = NORMAL * np.median(off) if off.size else 0.0
+    near = np.abs(values - median_filter(values, BESIDE, mode="nearest")) if off.size else off
+    kept = np.minimum(off, near) <= (OUTLIER * scale if scale > 0.0 else np.inf)
     block, time, values = block[kept], time[kept], values[kept]
 
     mean, count = group_means(block, values, n)

@@ -43,6 +43,20 @@ def test_one_wild_reading_does_not_move_the_mean() -> None:
     np.testing.assert_allclose(block_mean(time, values, EDGES), clean, atol=0.005)
 
 
+def test_a_step_within_a_block_moves_its_mean() -> None:
+    """As a torque steps where a drive starts: what stands off the block's median is no bad reading,
+    since its neighbours stand off too.
+    """
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 5.0, 0.004)
+    values = np.where(time < 2.575, 0.0, 5.0) + rng.normal(0.0, 0.01, time.size)
+    mean = block_mean(time, values, EDGES)
+    own = (time >= EDGES[25]) & (time < EDGES[26])
+    assert 0.5 < np.mean(values[own]) < 2.0
+    assert mean[25] == pytest.approx(np.mean(values[own]), abs=0.3)
+    assert np.isfinite(mean[1:-1]).all()
+
+
 def test_a_steady_speed_is_averaged_longer_than_a_step() -> None:
     """Coarse counts at creeping speed: quiet where steady, yet a step in speed is not smeared
     beyond its neighbours.

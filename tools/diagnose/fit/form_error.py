@@ -7,20 +7,20 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
 
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
-own, since another formula shares the effect out among the channels in another way. What an effect
-of the soil does may follow slip and load over an arc of rolling, and build up where each run
-begins: soil has to move first. Another law of shear does as much at another shear displacement, so
-it may act as a change of slip too. No law says what profile a rim, a hub or a tooth has, so a
-ripple may also have other harmonics, of up to twice its size. No wall, rail, pulley or bed is the
-same all along, so what is not of the drive may also vary with the place, in waves of any length
-down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how a zero
-creeps, or how it is set before each run: it may follow any smooth function, of up to twice the
-size of our formula. What the parameters of the model's effects can do is taken out of all this,
-so that a strength is what its effect does on the whole; so is what the constants of a drive without
-soil can do. ρ is how far published forms differ; its
-prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
-never reported as if it were exact: where the soil can absorb most of an effect, another form of it
-changes the soil and hardly the fit.
+own, since another formula shares the effect out among the channels in another way; and an effect
+may do more one way than the other, as a gear loses torque by which side drives. What an effect of
+the soil does may follow slip and load over an arc of rolling, and build up where each run begins:
+soil has to move first. Another law of shear does as much at another shear displacement, so it may
+act as a change of slip too. No law says what profile a rim, a hub or a tooth has, so a ripple may
+also have other harmonics, of up to twice its size. No wall, rail, pulley or bed is the same all
+along, so what is not of the drive may also vary with the place, in waves of any length down to a
+twelfth of the way, with a size of its own, which is mostly nought. No law says how a zero creeps,
+or how it is set before each run: it may follow any smooth function, of up to twice the size of our
+formula. What the parameters of the model's effects can do is taken out of all this, so that a
+strength is what its effect does on the whole; so is what the constants of a drive without soil can
+do. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the best
+one to name an effect by, but the soil is never reported as if it were exact: where the soil can
+absorb most of an effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def _other_forms(
     for harmonics in _harmonics(stack, effect):
         yield _share(added, harmonics), _free_zero_sizes(), 0
 
-    columns = _share(added, np.column_stack((functions, _by_channel(stack, added))))
+    columns = _share(added, np.column_stack((functions, _by_channel(stack, added), np.sign(added))))
     if effect.stage in OF_SOIL:
         columns = np.column_stack((columns, _following(stack, added)))
     if effect.stage == OF_SHEAR:

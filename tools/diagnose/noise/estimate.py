@@ -160,18 +160,21 @@ def calmer(
     idle: Bools,
 ) -> Noise:
     """Where the torque is the motor's alone, the noise is that of its current: found from idle
-    values (N,), and in force at all of them. Neither single values nor their mean count for more
-    than they are found to. A difference of two torques is no quieter than the motor's alone.
+    values (N,), and in force at all of them. They are few and cannot tell a colour: they count for
+    no more than by the colour of the channel, nor than by one of their own. A difference of two
+    torques is no quieter than the motor's alone.
     """
     stack = noise.stack
     if np.count_nonzero(idle) < 2 * TUNING.noise.cell_values:  # as of two conditions
         return noise
-    own = _colour_of(stack, "torque", residual, explainable, cells, before, idle)
     usual = noise.colours[stack.rig.channels.index("torque")]
+    of_idle = stack, "torque", residual, explainable, cells, before, idle
+    own = _colour_of(*of_idle)
+    (alike,), _ = _sized(*of_idle, [usual])
 
     step = step_of(stack.gaps)
-    power, usual_power = (c.sigma**2 * _slow_power(c, step) for c in (own, usual))
-    ratio = max(own.sigma / usual.sigma, float(np.sqrt(power / usual_power)))
+    power, least, most = (c.sigma**2 * _slow_power(c, step) for c in (own, alike, usual))
+    ratio = float(np.sqrt(max(power, least) / most))
     times = np.where(stack.idle, np.clip(ratio, TUNING.noise.least_noise, 1.0), 1.0)
     return replace(noise, rougher=noise.times * times)
 
@@ -236,8 +239,23 @@ def _colour_of(
     before: Noise,
     rows: Bools,
 ) -> Colour:
-    """Of a channel's noise, by some rows (N,) where they hold any of its steady values: of all
-    colours that are tried, each in its likeliest size.
+    """Of a channel's noise, by some rows (N,) where they hold any of its steady values."""
+    sized, weight = _sized(stack, channel, residual, saturated, cells, before, rows, colours())
+    return _careful(sized, weight, step_of(stack.gaps))
+
+
+def _sized(
+    stack: Stack,
+    channel: str,
+    residual: Array,
+    saturated: Explainable,
+    cells: Index,
+    before: Noise,
+    rows: Bools,
+    tried: Sequence[Colour],
+) -> tuple[list[Colour], Array]:
+    """The same of all colours that are tried, each in its likeliest size, and their probabilities
+    (g,).
     """
     own = _steady(stack, channel, before)
     if (own & rows).any():
@@ -245,7 +263,6 @@ def _colour_of(
     mean = saturated_mean(residual[own], saturated.leading[own], saturated.whole[own], cells[own])
     columns = np.column_stack((mean, residual[own]))
 
-    tried = colours()
     gram, log_det = products_of_innovations(columns, stack.gaps_of(own), tried)
     likelihood, variance = restricted(gram, log_det, len(columns))
     posterior = likelihood + log_prior(tried, stack.gaps)
@@ -256,7 +273,7 @@ def _colour_of(
         replace(c, sigma=max(float(np.sqrt(v)), least))
         for c, v in zip(tried, variance, strict=True)
     ]
-    return _careful(sized, weight / weight.sum(), step_of(stack.gaps))
+    return sized, weight / weight.sum()
 
 
 def colours() -> list[Colour]:

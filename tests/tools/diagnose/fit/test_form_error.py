@@ -75,6 +75,22 @@ def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(building)) == follows
 
 
+def test_an_effect_may_do_more_one_way_than_the_other() -> None:
+    """As a gear that loses torque makes an inertia larger when it is sped up."""
+    problem = _problem()
+    stack, effect = problem.stack, EFFECTS["wheel_inertia"]
+    free = free_of((effect,))
+    none = np.zeros(len(stack.rig.constants))
+    fitted = problem.descend((effect,), free, none, np.ones(len(free)), rounds=0)
+    *_, term = form_errors(stack, problem.noise, fitted)
+
+    added = fitted.predicted - stack.predict(none, ())
+    assert added.min() < 0.0 < added.max()
+    every = np.column_stack((term.columns.dense, fitted.raw[:, len(none) :]))
+    left = np.abs(added) - every @ np.linalg.lstsq(every, np.abs(added), rcond=None)[0]
+    assert np.linalg.norm(left) < 1e-6 * np.linalg.norm(added)
+
+
 def _rolled(stack: Stack) -> np.ndarray:
     """Angle [rad] that the wheel has turned since each run began (N,)."""
     out = np.zeros(stack.size)

@@ -37,19 +37,20 @@ class OddsCalibration:
     candidates: int = 1
 
     def weights(
-        self, evidence: Array, count: Array, functions: Array, needed: Array | int = 0
+        self, evidence: Array, count: Array, functions: Array, companions: Array | None = None
     ) -> Array:
         """Log weights (k,) of explanations, up to a constant; the lapse is not in them.
 
         evidence: above the discrepancy of form alone [nats] (k,); count: of listed effects (k,);
         functions: without a name that act too (k,). Of a large misfit no formula takes all, and
-        what one leaves pays for companions that are not there: each further effect or function must
-        gain a share of it, where that is more than the odds of one more ask for. needed (k,): of
-        these as many as no explanation by fewer effects can do without.
+        what one leaves pays for companions (k,) that are not there: each must gain a share of it,
+        where that is more than the odds of one more ask for. None: all that act beside another.
         """
+        if companions is None:
+            companions = np.maximum(count + functions - 1, 0)
         asked = self.temperature * (np.log(self.candidates) - self.more)
         beyond = np.maximum(TUNING.verdict.companion * evidence - asked, 0.0)
-        price = np.maximum(count + functions - needed - 1, 0) * beyond
+        price = companions * beyond
         odds = np.where(count > 0, self.listed + (count - 1) * self.more, 0.0)
         odds = odds - count * np.log(self.candidates) + (functions > 0) * self.nameless
         return np.asarray((evidence - price) / self.temperature + odds)

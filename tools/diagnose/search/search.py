@@ -23,10 +23,12 @@ from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.evidence import Pass, Weighed, pass_beside, varied_pass
 from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 TURNING = "wheel_angle"  # what an effect that ripples goes with
 FURTHER = {1: "second", 2: "third"}  # effect, beside so many
@@ -72,7 +74,8 @@ class EffectSearch:
     def weight(self, model: Model) -> float:
         """Log weight of a model against the bare one, by the prior of so many effects."""
         evidence, count = np.array([self.gain(model)]), np.array([len(model.names)])
-        return float(self.calibration.weights(evidence, count, np.zeros(1))[0])
+        companions = np.array([in_one_place(self.problem.stack, model)])
+        return float(self.calibration.weights(evidence, count, np.zeros(1), companions)[0])
 
     def sized(self, size: int) -> list[Model]:
         """Models of so many effects, the likeliest first."""
@@ -84,6 +87,24 @@ class EffectSearch:
 
     def has(self, names: Collection[str]) -> bool:
         return any(set(m.names) == set(names) for m in self.models)
+
+
+def in_one_place(stack: Stack, model: Model) -> float:
+    """How many of a model's effects act in the channels where others act, but one: each by the
+    share that its squares have in common with those of the rest.
+    """
+    if len(model.names) < 2:
+        return 0.0
+    fitted = model.fitted
+    done = (fitted.own[:, len(fitted.u) :] * fitted.x) ** 2
+    shown = np.array([stack.of(channel) for channel in stack.rig.channels], float) @ done
+    of = np.array([f.name for f in fitted.free])
+    squares = np.array([shown[:, of == name].sum(axis=1) for name in model.names])
+
+    rest = squares.sum(axis=0) - squares
+    own, rest = (s / np.maximum(s.sum(axis=1, keepdims=True), SPAN) for s in (squares, rest))
+    common = np.minimum(own, rest).sum(axis=1)
+    return float(common.sum() - common.max())
 
 
 def search_models(
@@ -311,22 +332,35 @@ def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
     return tuple(free)
 
 
-# ---- one effect less ---------------------------------------------------------------------------
+# ---- one effect less, or another in its place ---------------------------------------------------
 
 
 def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
     """With the best model less each of its effects, fitted from where the best one stands: no
-    effect may owe its place to a fit of the others that ended elsewhere.
+    effect may owe its place to a fit of the others that ended elsewhere. And with others in the
+    place of one: what cannot be told from it alone may not be beside the rest either.
     """
     if len(best.names) < 2:
         return search
 
-    def less(leave: str) -> Model | None:
-        return attempted(lambda: _less(search, best, leave))
+    def changed(change: tuple[str, Model | None]) -> Model | None:
+        return attempted(lambda: _changed(search, best, *change))
 
-    made = each(jobs, less, best.names, shared(search))
+    changes = [*((name, None) for name in best.names), *_rivals(search, best)]
+    made = each(jobs, changed, changes, shared(search))
     again = [model for model in made if model is not None]
     return replace(search, models=tuple(_the_better((*search.models, *again))))
+
+
+def _rivals(search: EffectSearch, best: Model) -> Iterator[tuple[str, Model]]:
+    """Of each effect of a model, those that are as likely alone and stand in no model like it."""
+    alone = {model.names[0]: model for model in search.sized(1)}
+    for name in (n for n in best.names if n in alone):
+        least = alone[name].evidence - TUNING.search.little
+        for rival in search.sized(1)[: TUNING.search.again]:
+            instead = {*best.names, *rival.names} - {name}
+            if rival.evidence > least and not search.has(instead) and len(instead) > 1:
+                yield name, rival
 
 
 def _the_better(models: Sequence[Model]) -> Iterator[Model]:
@@ -345,17 +379,23 @@ def without(search: EffectSearch, model: Model, name: str) -> Model:
     if not kept:
         return search.bare
     known = [m for m in search.models if set(m.names) == set(kept)]
-    return max(known, key=lambda m: m.evidence) if known else _less(search, model, name)
+    return max(known, key=lambda m: m.evidence) if known else _changed(search, model, name)
 
 
-def _less(search: EffectSearch, model: Model, name: str) -> Model:
-    """A model less one of its several effects, fitted from where it stands."""
-    fitted, kept = model.fitted, tuple(n for n in model.names if n != name)
-    types = tuple(e for e, n in zip(fitted.effects, model.names, strict=True) if n != name)
-    still = [f.name != name for f in fitted.free]
+def _changed(search: EffectSearch, model: Model, leave: str, rival: Model | None = None) -> Model:
+    """A model of several effects less one, or with that of another model in its place, fitted from
+    where both stand.
+    """
+    fitted, kept = model.fitted, tuple(n for n in model.names if n != leave)
+    types = tuple(e for e, n in zip(fitted.effects, model.names, strict=True) if n != leave)
+    still = [f.name != leave for f in fitted.free]
     free = tuple(f for f, stays in zip(fitted.free, still, strict=True) if stays)
-    begins = (fitted.u, fitted.x[np.array(still, bool)])
+    x = fitted.x[np.array(still, bool)]
+    if rival is not None:
+        types, free = (*types, *rival.fitted.effects), (*free, *rival.fitted.free)
+        x = np.concatenate((x, rival.fitted.x))
     screening, errors = search.screening, model.other_forms.of(kept)
+    begins = (fitted.u, x)
     return fit_model(
         screening.problem, screening.forms, types, free, begins, model.sizes, errors, fitted
     )

@@ -22,7 +22,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration
-from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, without
+from gritd.tools.diagnose.search.search import EffectSearch, counting, in_one_place, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation
@@ -104,7 +104,7 @@ def judged(
         np.array([w.evidence for w in weighed]),
         np.array([len(w.names) for w in weighed]),
         np.array([w.functions for w in weighed]),
-        np.array([_needed(w, weighed) for w in weighed]),
+        np.array([_companions(w, weighed) for w in weighed]),
     )
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
@@ -133,12 +133,15 @@ def judged(
     )
 
 
-def _needed(of: WeighedExplanation, weighed: Sequence[WeighedExplanation]) -> int:
-    """How many effects an explanation needs beside one: those of a trusted one are companions of
-    another only where some of them are trusted without the others.
+def _companions(of: WeighedExplanation, weighed: Sequence[WeighedExplanation]) -> float:
+    """How many of the effects and functions of an explanation only go with another: effects as far
+    as they act in the channels of that one. Those of a trusted explanation are companions only
+    where some of them are trusted without the others.
     """
     fewer = (w for w in weighed if set(w.names) < set(of.names) and not w.functions)
-    return 0 if not _trusted(of) or any(map(_trusted, fewer)) else len(of.names) - 1
+    apart = _trusted(of) and not any(map(_trusted, fewer))
+    functions = of.functions if of.names else max(of.functions - 1, 0)
+    return functions + (0.0 if apart else of.common)
 
 
 def _trusted(of: WeighedExplanation) -> bool:
@@ -174,11 +177,15 @@ def _predicts(search: EffectSearch, whole: Model) -> bool:
 def trusting(
     search: EffectSearch, weighed: Sequence[WeighedExplanation], by: OddsCalibration
 ) -> list[WeighedExplanation]:
-    """Explanations with the share that their effects take, and how far these are to be trusted."""
+    """Explanations with what their effects have in common, the share that these take, and how far
+    they are to be trusted.
+    """
     rig, made = search.problem.stack.rig, []
     for w in weighed:
         share = taken_share(search, w.model) if w.names else 0.0
-        made.append(replace(w, share=share, trust=trusted(rig, w.model, share, by)))
+        trust = trusted(rig, w.model, share, by)
+        common = in_one_place(search.problem.stack, w.model)
+        made.append(replace(w, common=common, share=share, trust=trust))
     return made
 
 

@@ -19,6 +19,7 @@ class WeighedExplanation:
 
     names:    listed effects; none for the discrepancy of form alone.
     functions: how many unexplained terms act beside them.
+    common:   how many of the effects act in the channels where others act, but one.
     share:    of the misfit that the effects take.
     trust:    of each effect, the probability that it is there and nothing that resembles it, if
         this explanation is the best.
@@ -29,6 +30,7 @@ class WeighedExplanation:
     functions: int
     evidence: float
     probability: float = 0.0
+    common: float = 0.0
     share: float = 0.0
     trust: tuple[float, ...] = ()
 

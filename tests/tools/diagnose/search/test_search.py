@@ -33,7 +33,7 @@ from gritd.tools.diagnose.search.search import (
 )
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
-from tests.tools.diagnose.campaigns import plan, settings
+from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 
 pytestmark = pytest.mark.long
 
@@ -160,3 +160,17 @@ def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     u = search.bare.fitted.u
     alone = [_fitted_with(search, predicted, x.start, x.sizes, u) for x in predicted.starts]
     assert best >= max(model.evidence for model in alone) - 1e-6
+
+
+def test_a_small_effect_shows_beside_a_large_one_in_another_channel() -> None:
+    """Whatever no formula takes of a large friction cannot pay for what a hub does to the sinkage;
+    and what is as likely alone as that friction is so beside the hub.
+    """
+    acting = make("coulomb_friction", {"loss": 3.0}), make("hub_runout", {"lift_cos": 4e-4})
+    drawn = plan(standstill=False, noise=2.0)
+    found = diagnosed(drawn, acting)
+    named = {h.effect: h for h in found.hypotheses if h.accepted}
+    assert "hub_runout" in named, found.summary
+    (other,) = set(named) - {"hub_runout"}
+    group = {other, *named[other].indistinguishable_from}
+    assert group >= {"coulomb_friction", "asymmetric_friction"}

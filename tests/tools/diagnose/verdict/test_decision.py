@@ -108,7 +108,7 @@ def _judged(listed: float, nameless: float, trust: float, parameters: int = 1) -
     search = _searched(bare)
     weighed: Any = [
         decide.WeighedExplanation(bare, (), 0, 0.0),
-        decide.WeighedExplanation(best, ("a",), 0, listed, 0.0, 0.9, (trust,)),
+        decide.WeighedExplanation(best, ("a",), 0, listed, share=0.9, trust=(trust,)),
         decide.WeighedExplanation(bare, (), 1, nameless),
     ]
     return decide.judged(search, weighed, {}, learnt(30))

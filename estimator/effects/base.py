@@ -236,6 +236,11 @@ class Effect:
         return None if cls.fingerprint.covariate in COURSE else cls
 
     @classmethod
+    def without_side_force(cls) -> type[Effect]:
+        """The effect where no side force is compared."""
+        return cls
+
+    @classmethod
     def sentence(cls) -> str:
         """What the effect is, in plain words."""
         return inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].replace("\n", " ")

@@ -6,7 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.effects.base import (
+    Effect,
+    Fingerprint,
+    Parameter,
+    shape,
+    strength,
+    told_apart,
+)
 from gritd.estimator.stages.situation import Balanced, ContactLaw, Reaction, Situation
 from gritd.estimator.terramechanics.original import velocity_ratio
 
@@ -23,7 +30,7 @@ class SideSlip(Effect):
     The shear stress has the direction of the displacement j (m = 0), or of the sliding s (m = 1).
     The soil may yield sideways by another shear modulus than along the wheel, κ = k_x/k_y, as in
     the source. Soil that a wheel carries aside digs, as that does which it carries back
-    (`slip_sinkage`).
+    (`slip_sinkage`). Where no side force is compared, κ is 1.5 and d is 0.
     Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, Eq. (9); Wong
     (2008), Theory of Ground Vehicles, 4th ed., ch. 1, for the sliding.
     """
@@ -71,3 +78,17 @@ class SideSlip(Effect):
     def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
         slid = np.minimum(velocity_ratio(situation.slip), 1.0) * float(np.tan(self.angle))
         return replace(reaction, sinkage=reaction.sinkage + self.digging * slid)
+
+    @classmethod
+    def without_side_force(cls) -> type[Effect]:
+        return SideSlipInPlane
+
+
+class SideSlipInPlane(SideSlip):
+    """A wheel whose side force was not compared: nothing tells how soil yields sideways, nor if
+    the wheel digs as it slides.
+    """
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        return tuple(p for p in super().parameters() if p.name not in ("digging", "across"))

@@ -59,6 +59,17 @@ def test_a_side_force_without_calibration_is_recorded_only(
     assert "side_force" not in rig_of(read_all(files), settings)[0].channels
 
 
+def test_what_only_a_side_force_tells_is_not_sought_without_one(
+    skewed: tuple[BlindCase, list[Path], Settings],
+) -> None:
+    """A wheel that may yield and dig sideways as it likes passes for many others."""
+    _, files, settings = skewed
+    recordings = read_all(files)
+    rigs = [rig_of(recordings, own)[0] for own in (settings, shown(settings, 1.0))]
+    without, having = ({p.name for p in rig.effects["side_slip"].parameters()} for rig in rigs)
+    assert having - without == {"across", "digging"} and "angle" in without
+
+
 def test_check_config_shows_the_axis_and_refuses_a_scale_of_nil(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

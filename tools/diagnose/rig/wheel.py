@@ -228,6 +228,8 @@ def _candidates(data: Recorded, known: Sequence[ConfiguredEffect]) -> dict[str, 
         left_out.add(AXIS_FRICTION)
 
     listed = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in left_out}
+    if "side_force" not in data.channels:
+        listed = {name: effect.without_side_force() for name, effect in listed.items()}
     if not data.tabled:
         return listed
     shown = {name: effect.in_steady_states() for name, effect in listed.items()}

@@ -11,6 +11,7 @@ from gritd.estimator.effects.base import (
     RATE_REFERENCE,
     Effect,
     Fingerprint,
+    shape,
     strength,
     told_apart,
 )
@@ -22,20 +23,31 @@ from gritd.estimator.terramechanics.soil import Soil
 class RateDependentSinkage(Effect):
     """Soil that is loaded faster yields less, so a faster wheel rides higher.
 
-    K · ((r|ω| + v_f)/(v₀ + v_f))^m,   v₀ = 20 mm/s,   v_f = 1 mm/s keeps a standing wheel finite
+    K · ((u + v_f)/(v₀ + v_f))^m,   u = (1 − s) r|ω| + s |v|
+    v₀ = 20 mm/s;   v_f = 1 mm/s keeps a standing wheel finite
 
-    Source: Grahn (1991), J. Terramechanics 28: p = k ż^m zⁿ; the penetration rate ż scales with
-    speed.
+    The speed is that of the rim, which goes down at r|ω| sin θ (s = 0), or that of travel, for a
+    wheel that passes presses the soil down at |v| tan θ (s = 1).
+    Source: Grahn (1991), J. Terramechanics 28: p = k ż^m zⁿ with the rate of penetration ż.
     """
 
     power: float = strength("exponent of speed, m", "", typical=0.08, low=-0.5, high=1.0)
+    travel: float = shape(
+        "share in which the speed is that of travel, s",
+        "",
+        mean=0.0,
+        sigma=0.5,
+        low=0.0,
+        high=1.0,
+    )
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "speed", "sinkage falls with speed at fixed load and slip")
     confusable_with = told_apart(rate_dependent_shear="speed_step", multipass="speed_step")
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
-        speed = situation.radius * np.abs(situation.wheel_speed)
+        rim, passing = situation.radius * situation.wheel_speed, np.abs(situation.carriage_speed)
+        speed = np.abs(rim) + self.travel * (passing - np.abs(rim))
         return replace(
             soil,
             modulus=soil.modulus

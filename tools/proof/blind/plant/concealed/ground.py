@@ -104,15 +104,24 @@ class LogarithmOfPasses(PlantEffect):
 
 @dataclass(frozen=True)
 class LogarithmicRate(PlantEffect):
-    """K [1 + m ln((v + v₁)/(v₀ + v₁))], v of the carriage.
+    """K [1 + m ln((u + v₁)/(v₀ + v₁))], u = v (W/W₀)^0.3, v of the carriage: a heavier wheel stands
+    deeper and presses the soil down at a steeper angle.
 
-    Source: logarithmic rate law of dry granular penetration, in place of Grahn's power law (1991).
+    Source: logarithmic rate law of dry granular penetration, in place of Grahn's power law (1991);
+    the power of the weight was chosen here.
     """
+
+    weight: float = 60.0  # W₀ [N]
 
     name, most = "rate_dependent_sinkage", 0.2
 
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, facts.weight)
+
     def soil(self, ground: PlantSoil, scene: Scene) -> PlantSoil:
-        gain = np.log((np.abs(scene.motion.speed) + SLOWEST) / (USUAL + SLOWEST))
+        steep = (np.maximum(scene.motion.weight, 1.0) / self.weight) ** 0.3
+        gain = np.log((np.abs(scene.motion.speed) * steep + SLOWEST) / (USUAL + SLOWEST))
         return replace(ground, modulus=ground.modulus * np.maximum(1.0 + self.strength * gain, 0.1))
 
 

@@ -338,7 +338,7 @@ def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
 def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
     """With the best model less each of its effects, fitted from where the best one stands: no
     effect may owe its place to a fit of the others that ended elsewhere. And with others in the
-    place of one: what cannot be told from it alone may not be beside the rest either.
+    place of one: what alone is as likely as it may be so beside the rest.
     """
     if len(best.names) < 2:
         return search

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.terramechanics.soil import Array
@@ -136,7 +135,7 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
 
     off = np.abs(values - _median(block, values, n)[block])
     scale = NORMAL * np.median(off) if off.size else 0.0
-    near = np.abs(values - median_filter(values, BESIDE, mode="nearest")) if off.size else off
+    near = np.abs(values - _running_median(values)) if off.size else off
     kept = np.minimum(off, near) <= (OUTLIER * scale if scale > 0.0 else np.inf)
     block, time, values = block[kept], time[kept], values[kept]
 
@@ -230,6 +229,12 @@ def _median(block: Ints, values: Array, n: int) -> Array:
     count = np.bincount(block, minlength=n)
     middle = np.cumsum(count) - count + count // 2
     return np.where(count > 0, values[order[np.minimum(middle, max(values.size - 1, 0))]], 0.0)
+
+
+def _running_median(values: Array) -> Array:
+    """Median (n,) of each value and its neighbours, BESIDE together."""
+    padded = np.pad(values, BESIDE // 2, mode="edge")
+    return np.asarray(np.median(sliding_window_view(padded, BESIDE), axis=1))
 
 
 def _joined(sums: Array, most: int) -> Array:

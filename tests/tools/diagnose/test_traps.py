@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -46,28 +47,17 @@ def test_a_quiet_rig_gives_no_alarm() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("slow_time", "allowed"), [(0.3, 0), (1.0, 0), (3.0, 1)])
-@pytest.mark.parametrize("noise", [0.5, 2.0])
-def test_coloured_noise_of_unknown_size_gives_no_alarm(
-    slow_time: float, allowed: int, noise: float
-) -> None:
-    """iid tests cry wolf; the configured noise is half or twice the true one.
-
-    Noise with 3 s of memory makes a trend in runs of 14 s by chance, in a few campaigns of a
-    hundred: one of the later seeds may.
+def test_coloured_noise_of_unknown_size_gives_no_alarm() -> None:
+    """iid tests cry wolf; the configured noise is half or twice the true one. Of 120 campaigns 2 %
+    may alarm, none in noise that is soon forgotten.
     """
-    every = [
-        diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed))
-        for seed in range(1, 9)
-    ]
-    alarms = [
-        number
-        for number, found in enumerate(every)
-        if found.verdict not in ("consistent", "insufficient")
-    ]
-    assert len(alarms) <= allowed and not {0, 1} & set(alarms), [
-        every[number].summary for number in alarms
-    ]
+    alarms = []
+    for slow_time, noise, seed in product((0.3, 1.0, 3.0), (0.5, 2.0), range(1, 21)):
+        found = diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed))
+        if found.verdict not in ("consistent", "insufficient"):
+            alarms.append((slow_time, found.summary))
+    assert len(alarms) <= 2, alarms
+    assert all(slow_time > 0.3 for slow_time, _ in alarms), alarms
 
 
 def test_what_the_soil_absorbs_shows_as_strain() -> None:

@@ -30,7 +30,8 @@ class SideSlip(Effect):
     The shear stress has the direction of the displacement j (m = 0), or of the sliding s (m = 1).
     The soil may yield sideways by another shear modulus than along the wheel, κ = k_x/k_y, as in
     the source. Soil that a wheel carries aside digs, as that does which it carries back
-    (`slip_sinkage`). Where no side force is compared, κ is 1.5 and d is 0.
+    (`slip_sinkage`). Where no side force is compared, κ is 1.5 and d is 0: what shows there is
+    κ tan β, so β is no surer than κ, which its σ does not hold.
     Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, Eq. (9); Wong
     (2008), Theory of Ground Vehicles, 4th ed., ch. 1, for the sliding.
     """

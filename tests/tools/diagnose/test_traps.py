@@ -47,17 +47,17 @@ def test_a_quiet_rig_gives_no_alarm() -> None:
 
 
 @pytest.mark.long
-def test_coloured_noise_of_unknown_size_gives_no_alarm() -> None:
+@pytest.mark.parametrize(("slow_time", "allowed"), [(0.3, 0), (1.0, 1), (3.0, 1)])
+def test_coloured_noise_of_unknown_size_gives_no_alarm(slow_time: float, allowed: int) -> None:
     """iid tests cry wolf; the configured noise is half or twice the true one. Of 120 campaigns 2 %
     may alarm, none in noise that is soon forgotten.
     """
     alarms = []
-    for slow_time, noise, seed in product((0.3, 1.0, 3.0), (0.5, 2.0), range(1, 21)):
+    for noise, seed in product((0.5, 2.0), range(1, 21)):
         found = diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed))
         if found.verdict not in ("consistent", "insufficient"):
-            alarms.append((slow_time, found.summary))
-    assert len(alarms) <= 2, alarms
-    assert all(slow_time > 0.3 for slow_time, _ in alarms), alarms
+            alarms.append(found.summary)
+    assert len(alarms) <= allowed, alarms
 
 
 def test_what_the_soil_absorbs_shows_as_strain() -> None:

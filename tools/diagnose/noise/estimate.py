@@ -169,8 +169,7 @@ def calmer(
         return noise
     usual = noise.colours[stack.rig.channels.index("torque")]
     of_idle = stack, "torque", residual, explainable, cells, before, idle
-    own = _colour_of(*of_idle)
-    (alike,), _ = _sized(*of_idle, [usual])
+    own, alike = _colour_of(*of_idle), _colour_of(*of_idle, [usual])
 
     step = step_of(stack.gaps)
     power, least, most = (c.sigma**2 * _slow_power(c, step) for c in (own, alike, usual))
@@ -238,24 +237,10 @@ def _colour_of(
     cells: Index,
     before: Noise,
     rows: Bools,
+    tried: Sequence[Colour] = (),
 ) -> Colour:
-    """Of a channel's noise, by some rows (N,) where they hold any of its steady values."""
-    sized, weight = _sized(stack, channel, residual, saturated, cells, before, rows, colours())
-    return _careful(sized, weight, step_of(stack.gaps))
-
-
-def _sized(
-    stack: Stack,
-    channel: str,
-    residual: Array,
-    saturated: Explainable,
-    cells: Index,
-    before: Noise,
-    rows: Bools,
-    tried: Sequence[Colour],
-) -> tuple[list[Colour], Array]:
-    """The same of all colours that are tried, each in its likeliest size, and their probabilities
-    (g,).
+    """Of a channel's noise, by some rows (N,) where they hold any of its steady values: of those
+    that are tried, or of all colours, each in its likeliest size.
     """
     own = _steady(stack, channel, before)
     if (own & rows).any():
@@ -263,6 +248,7 @@ def _sized(
     mean = saturated_mean(residual[own], saturated.leading[own], saturated.whole[own], cells[own])
     columns = np.column_stack((mean, residual[own]))
 
+    tried = tried or colours()
     gram, log_det = products_of_innovations(columns, stack.gaps_of(own), tried)
     likelihood, variance = restricted(gram, log_det, len(columns))
     posterior = likelihood + log_prior(tried, stack.gaps)
@@ -273,7 +259,7 @@ def _sized(
         replace(c, sigma=max(float(np.sqrt(v)), least))
         for c, v in zip(tried, variance, strict=True)
     ]
-    return sized, weight / weight.sum()
+    return _careful(sized, weight / weight.sum(), step_of(stack.gaps))
 
 
 def colours() -> list[Colour]:

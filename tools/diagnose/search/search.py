@@ -395,7 +395,5 @@ def _changed(search: EffectSearch, model: Model, leave: str, rival: Model | None
         types, free = (*types, *rival.fitted.effects), (*free, *rival.fitted.free)
         x = np.concatenate((x, rival.fitted.x))
     screening, errors = search.screening, model.other_forms.of(kept)
-    begins = (fitted.u, x)
-    return fit_model(
-        screening.problem, screening.forms, types, free, begins, model.sizes, errors, fitted
-    )
+    forms, begins = screening.forms, (fitted.u, x)
+    return fit_model(screening.problem, forms, types, free, begins, model.sizes, errors, fitted)

@@ -103,12 +103,24 @@ def _forms_of(
         return ()
     functions, places = shares(stack, np.ones(stack.size, bool)), along_place(stack)
     named = np.column_stack((fitted.raw[:, own], stack.named))
-    return tuple(
-        random_effect(one.effect.name, _beside(noise, columns, named), noise, sizes, least)
-        for one in acting
-        if np.any(one.added)
-        for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places)
-    )
+    made: list[RandomEffect] = []
+    for one in (one for one in acting if np.any(one.added)):
+        for columns, sizes in _profiles(stack, noise, one):
+            free = _beside(noise, columns, named)
+            made.append(random_effect(one.effect.name, free, noise, sizes, profile=True))
+        for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places):
+            other = _beside(noise, columns, named)
+            made.append(random_effect(one.effect.name, other, noise, sizes, least))
+    return tuple(made)
+
+
+def _profiles(stack: Stack, noise: Noise, one: _Acting) -> Iterator[tuple[Array, Sizes]]:
+    """Of one effect, how it may go along what no law tells of: columns (N, m) with their sizes."""
+    sizes = even(TUNING.fit.profile_sizes)
+    for zeros in _free_zeros(stack, noise, one.effect, one.added):
+        yield zeros, sizes
+    for harmonics in _harmonics(stack, one.effect):
+        yield _share(one.added, harmonics), sizes
 
 
 def _other_forms(
@@ -120,12 +132,8 @@ def _other_forms(
     functions (N, f): of the conditions; places (N, p): along the bed.
     """
     effect, added = one.effect, one.added
-    for zeros in _free_zeros(stack, noise, effect, added):
-        yield zeros, _free_zero_sizes(), 0
     if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
         yield _share(added, places), _place_sizes(), 0
-    for harmonics in _harmonics(stack, effect):
-        yield _share(added, harmonics), _free_zero_sizes(), 0
 
     columns = _share(added, np.column_stack((functions, _by_channel(stack, added), np.sign(added))))
     if effect.stage in OF_SOIL:
@@ -154,10 +162,6 @@ def varied_along_place(stack: Stack, effect: type[Effect], made: Signature) -> l
 
 def _place_sizes() -> Sizes:
     return Sizes(TUNING.fit.place_sizes, TUNING.fit.place_prior)
-
-
-def _free_zero_sizes() -> Sizes:
-    return even(TUNING.fit.free_zero_sizes)
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,12 +65,9 @@ class Model:
         assert self.marginal is not None
         return self.marginal.moments(self.chosen, self.marginal.place_of(number))[0]
 
-    def zeros(self) -> Array:
-        """What zeros without a law amount to beyond our formula of them (N,), whitened: of effects
-        that go as they like along some covariate.
-        """
-        free = {effect.name for effect in self.fitted.acting if effect.free_along}
-        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, free)[1]
+    def profiles(self) -> Array:
+        """What effects amount to beyond our formula (N,), whitened, along what no law tells of."""
+        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, profile=True)[1]
 
     @property
     def _of_form(self) -> int:
@@ -79,17 +76,15 @@ class Model:
         sizes = _values(terms[: len(self.sizes)], self.sizes) if terms else []
         return sum(size > 0.0 for size in sizes)
 
-    def _amount(
-        self, begin: int, end: int, names: Collection[str] | None = None
-    ) -> tuple[Array, Array]:
-        """Of the acting terms begin … end − 1, beside what every fit has; of some names only."""
+    def _amount(self, begin: int, end: int, profile: bool = False) -> tuple[Array, Array]:
+        """Of the acting terms begin … end − 1, beside what every fit has; profile: of some only."""
         nuisance, slack = self.fitted.nuisance, self.fitted.slack
         ends = np.cumsum([term.columns.count for term, _ in nuisance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
             term, size = nuisance.parts[number]
-            if names is not None and term.name not in names:
+            if profile and not term.profile:
                 continue
             weights = slack[ends[number - 1] : ends[number]]
             own = own + size * term.columns.times(weights)

@@ -48,6 +48,7 @@ class RandomEffect:
 
     least: the number of the smallest size that counts for the uncertainty of the constants.
     of_form: whether it is what the equations of a wheel in soil miss of some channel.
+    profile: whether it is how an effect goes along what no law tells of.
     """
 
     name: str
@@ -56,6 +57,7 @@ class RandomEffect:
     sizes: Sizes
     least: int = 0
     of_form: bool = False
+    profile: bool = False
 
 
 def random_effect(
@@ -65,10 +67,11 @@ def random_effect(
     sizes: Sizes,
     least: int = 0,
     of_form: bool = False,
+    profile: bool = False,
 ) -> RandomEffect:
     """The term of columns (N, m) in the channels' units."""
     own = columns_of(columns)
-    return RandomEffect(name, own, whitened(noise, own), sizes, least, of_form)
+    return RandomEffect(name, own, whitened(noise, own), sizes, least, of_form, profile)
 
 
 def products(parts: Sequence[RandomEffect]) -> Array:

@@ -42,7 +42,7 @@ class FitTuning:
         (0.8, 0.1, 0.1), "prior", "probability of each of the sizes"
     )
 
-    free_zero_sizes: tuple[float, ...] = tuned(
+    profile_sizes: tuple[float, ...] = tuned(
         (0.0, 0.1, 0.5, 2.0), "-", "of an effect, over what no law says how it goes"
     )
     harmonics: int = tuned(4, "-", "of a ripple that it may have besides")

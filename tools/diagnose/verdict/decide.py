@@ -249,7 +249,7 @@ def _trust(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> d
 def taken_share(search: EffectSearch, model: Model) -> float:
     """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
     leaves when its effects are switched off and all else stays. Other forms of an effect do not
-    count, but for zeros, which no law tells how to go.
+    count, but for profiles: how it goes along what no law tells of.
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
@@ -258,7 +258,7 @@ def taken_share(search: EffectSearch, model: Model) -> float:
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
 
-    left = [off.residual - shared, fitted.residual - shared - model.zeros()]
+    left = [off.residual - shared, fitted.residual - shared - model.profiles()]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 

@@ -10,9 +10,11 @@ import pytest
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import EFFECTS, make
+from gritd.estimator.effects.hub_runout import HubRunout
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.terramechanics.soil import Scalar
 from gritd.tools.diagnose.fit.form_error import _following, baseline_terms, form_errors
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
@@ -219,6 +221,22 @@ def test_a_wall_that_is_not_straight_resembles_a_wall() -> None:
     found = diagnosed(plan(seconds=30.0), (_WavyWall(0.12),))
     assert found.hypotheses[0].effect == "side_wall_rubbing"
     assert "side_wall_rubbing" in found.summary and not found.accepted
+
+
+@dataclass(frozen=True)
+class _KeyedHub(HubRunout):
+    """A hub that lifts the potentiometer over two fifths of a turn only, by 1 mm."""
+
+    def _lift(self, angle: Scalar) -> Scalar:
+        turned = np.mod(angle, 2.0 * np.pi) / (2.0 * np.pi)
+        return 0.5e-3 * np.where(turned < 0.4, 1.0 - np.cos(5.0 * np.pi * turned), 0.0)
+
+
+def test_a_hub_of_any_profile_takes_the_misfit() -> None:
+    """What it does beyond one cycle a turn is its own, not something else that resembles a hub."""
+    found = diagnosed(plan(seconds=60.0), (_KeyedHub(1.0),))
+    assert [h.effect for h in found.accepted] == ["hub_runout"]
+    assert found.share > 0.9
 
 
 def test_no_law_says_what_profile_a_hub_has() -> None:

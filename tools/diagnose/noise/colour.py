@@ -1,7 +1,14 @@
 """The noise of each channel: its size and colour; whitening.
 
 A value's noise is white noise plus two Ornstein-Uhlenbeck processes: a fast one (what neighbouring
-slopes share) and a slow one of correlation time τ. Its size and colour are found in estimate.py.
+slopes share) and a slow one of correlation time τ. Its size and colour are found in estimate.py. A
+value is a mean over an interval Δ. A mean of slow noise is smoother than slow noise: means k > 0
+intervals apart have the covariance
+
+    (cosh x − 1) / (x − 1 + e⁻ˣ) e⁻ᵏˣ,   x = Δ/τ
+
+in units of their variance, as an Ornstein-Uhlenbeck process of more than their variance beside a
+white one of the difference, which is negative.
 What is uncertain of a single value is white noise beside these. It hides the slow noise at that
 value and does not make it larger.
 """
@@ -34,6 +41,13 @@ class Colour:
     time: float
     slow: float
     fast: float = 0.0
+
+    def shared(self, step: float) -> float:
+        """Share of the slow part by what neighbouring means over an interval [s] have in common."""
+        x = step / self.time
+        if x > 1.0:  # readings that are no means are as far apart
+            return self.slow
+        return float(self.slow * (np.cosh(x) - 1.0) / (x - 1.0 + np.exp(-x)))
 
 
 @dataclass(frozen=True)
@@ -197,9 +211,10 @@ def _recursion(
     """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the
     innovation (n, g). beside: (n,) or (n, g) variance of white noise beside that of each colour.
     """
-    fast_time = TUNING.noise.fast_time * step_of(gaps)
+    step = step_of(gaps)
+    fast_time = TUNING.noise.fast_time * step
     times = np.array([[c.time for c in colours], [fast_time] * len(colours)])
-    share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
+    share = np.array([[c.shared(step) for c in colours], [c.fast for c in colours]])
     own = np.zeros(len(gaps)) if beside is None else beside
 
     kept = np.exp(-gaps[None, :, None] / times[:, None, :])
@@ -243,8 +258,9 @@ def whiten_rows(noise: Noise, columns: Array, rows: Bools) -> Array:
 
 def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     """Of noise of a colour (n, n) at times (n,)."""
-    apart = np.abs(time[:, None] - time[None, :])
+    step, apart = step_of(gaps), np.abs(time[:, None] - time[None, :])
     slow = np.exp(-apart / colour.time)
-    fast = np.exp(-apart / (TUNING.noise.fast_time * step_of(gaps)))
-    white = (1.0 - colour.slow - colour.fast) * np.eye(len(time))
-    return np.asarray(colour.sigma**2 * (white + colour.slow * slow + colour.fast * fast))
+    fast = np.exp(-apart / (TUNING.noise.fast_time * step))
+    shared = colour.shared(step)
+    white = (1.0 - shared - colour.fast) * np.eye(len(time))
+    return np.asarray(colour.sigma**2 * (white + shared * slow + colour.fast * fast))

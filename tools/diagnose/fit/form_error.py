@@ -13,14 +13,14 @@ the soil does may follow slip and load over an arc of rolling, and build up wher
 soil has to move first. Another law of shear does as much at another shear displacement, so it may
 act as a change of slip too. No law says what profile a rim, a hub or a tooth has, so a ripple may
 also have other harmonics, of up to twice its size. No wall, rail, pulley or bed is the same all
-along, so what is not of the drive may also vary with the place, in waves of any length down to a
-twelfth of the way, with a size of its own, which is mostly nought. No law says how a zero creeps,
-or how it is set before each run: it may follow any smooth function, of up to twice the size of our
-formula. What the parameters of the model's effects can do is taken out of all this, so that a
-strength is what its effect does on the whole; so is what the constants of a drive without soil can
-do. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the best
-one to name an effect by, but the soil is never reported as if it were exact: where the soil can
-absorb most of an effect, another form of it changes the soil and hardly the fit.
+along, so what is of neither the drive nor its current may also vary with the place, in waves of any
+length down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how
+a zero creeps, or how it is set before each run: it may follow any smooth function, of up to twice
+the size of our formula. What the parameters of the model's effects can do is taken out of all this,
+so that a strength is what its effect does on the whole; so is what the constants of a drive without
+soil can do. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be
+the best one to name an effect by, but the soil is never reported as if it were exact: where the
+soil can absorb most of an effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import DEPENDENT, SLIGHT, SQUARE
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
-NOWHERE = ("drivetrain",)  # stages that know of no place on the bed
 OF_SHEAR = "contact"  # the stage of shear stress, which follows the shear displacement
 OF_SOIL = ("soil", "contact", "wheel")  # stages whose effects follow: soil has to move first
 
@@ -132,7 +131,7 @@ def _other_forms(
     functions (N, f): of the conditions; places (N, p): along the bed.
     """
     effect, added = one.effect, one.added
-    if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
+    if _placed(type(effect)) and places.shape[1]:
         yield _share(added, places), _place_sizes(), 0
 
     columns = _share(added, np.column_stack((functions, _by_channel(stack, added), np.sign(added))))
@@ -151,10 +150,18 @@ def _share(added: Array, functions: Array) -> Array:
     return np.asarray(added[:, None] * functions / np.sqrt(functions.shape[1]))
 
 
+def _placed(effect: type[Effect]) -> bool:
+    """Whether what an effect does may vary with the place on the bed: neither a drive, nor what
+    reads its current, knows of that, and zeros vary as they like.
+    """
+    of_current = effect.stage == "sensor" and effect.fingerprint.channel == "torque"
+    return effect.stage != "drivetrain" and not of_current and not effect.free_along
+
+
 def varied_along_place(stack: Stack, effect: type[Effect], made: Signature) -> list[Array]:
     """Each strength of a signature as it may vary along the bed (N, m), by the largest share."""
     places = along_place(stack)
-    if effect.stage in NOWHERE or effect.free_along or not places.shape[1]:
+    if not _placed(effect) or not places.shape[1]:
         return []
     share = TUNING.fit.place_sizes[-1] / np.sqrt(places.shape[1])
     return [share * column[:, None] * places for column in made.columns.T]

@@ -12,7 +12,9 @@ from gritd.tools.diagnose.fit.form_error import baseline_terms, form_errors
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +153,9 @@ def fit_model(
 
     Every fit has the terms of its effects too, as far as they are known when it begins. Without
     the other forms that these need, it would strain the constants, to where linear algebra tells
-    nothing. The other forms are made anew where the first fits ended, and then stay: of two effects
-    that are nearly one, each could take the other's part from round to round.
+    nothing. The other forms are made anew where the first fits ended, and then stay, unless an
+    effect shrinks: of two effects that are nearly one, each could take the other's part from round
+    to round.
 
     problem: without terms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
@@ -165,10 +168,12 @@ def fit_model(
     fitted = problem.with_terms(every, _values(every, sizes)).descend(
         effects, free, *start, near=near
     )
+    made = fitted
     for number in range(TUNING.numerics.size_rounds):
         known = every
-        if number < TUNING.numerics.form_rounds or _without_form_errors(fitted, every):
-            every = (*forms, *form_errors(problem.stack, problem.noise, fitted))
+        begun = number < TUNING.numerics.form_rounds
+        if begun or _without_form_errors(fitted, every) or _shrunk(made, fitted):
+            every, made = (*forms, *form_errors(problem.stack, problem.noise, fitted)), fitted
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
 
@@ -190,6 +195,41 @@ def _without_form_errors(fitted: Fitted, terms: Sequence[RandomEffect]) -> bool:
     own = zip(fitted.free, fitted.x, strict=True)
     acting = {f.name for f, x in own if f.parameter.role == "strength" and x != 0.0}
     return not acting <= {term.name for term in terms}
+
+
+def _shrunk(made: Fitted, fitted: Fitted) -> bool:
+    """Whether an effect does less than half of what it did where its other forms were made: they
+    would be shares of what is no longer there.
+    """
+    before, now = does(made), does(fitted)
+    return any(now[name] < 0.5 * before[name] for name in now)
+
+
+def does(fitted: Fitted) -> dict[str, float]:
+    """Size of what the strengths of each effect do, whitened."""
+    does = fitted.own[:, len(fitted.u) :] * fitted.x
+    strengths = np.array([f.parameter.role == "strength" for f in fitted.free])
+    of = np.array([f.name for f in fitted.free])
+    names = (effect.name for effect in fitted.acting)
+    return {n: float(np.linalg.norm(does[:, strengths & (of == n)].sum(axis=1))) for n in names}
+
+
+def in_one_place(stack: Stack, model: Model) -> float:
+    """How many of a model's effects act in the channels where others act, but one: each by the
+    share that its squares have in common with those of the rest.
+    """
+    if len(model.names) < 2:
+        return 0.0
+    fitted = model.fitted
+    done = (fitted.own[:, len(fitted.u) :] * fitted.x) ** 2
+    shown = np.array([stack.of(channel) for channel in stack.rig.channels], float) @ done
+    of = np.array([f.name for f in fitted.free])
+    squares = np.array([shown[:, of == name].sum(axis=1) for name in model.names])
+
+    rest = squares.sum(axis=0) - squares
+    own, rest = (s / np.maximum(s.sum(axis=1, keepdims=True), SPAN) for s in (squares, rest))
+    common = np.minimum(own, rest).sum(axis=1)
+    return float(common.sum() - common.max())
 
 
 def _handed_on(

@@ -19,16 +19,15 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
-from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.model import Model, does, fit_model, in_one_place
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.evidence import Pass, Weighed, pass_beside, varied_pass
 from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SPAN
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 TURNING = "wheel_angle"  # what an effect that ripples goes with
 FURTHER = {1: "second", 2: "third"}  # effect, beside so many
@@ -87,24 +86,6 @@ class EffectSearch:
 
     def has(self, names: Collection[str]) -> bool:
         return any(set(m.names) == set(names) for m in self.models)
-
-
-def in_one_place(stack: Stack, model: Model) -> float:
-    """How many of a model's effects act in the channels where others act, but one: each by the
-    share that its squares have in common with those of the rest.
-    """
-    if len(model.names) < 2:
-        return 0.0
-    fitted = model.fitted
-    done = (fitted.own[:, len(fitted.u) :] * fitted.x) ** 2
-    shown = np.array([stack.of(channel) for channel in stack.rig.channels], float) @ done
-    of = np.array([f.name for f in fitted.free])
-    squares = np.array([shown[:, of == name].sum(axis=1) for name in model.names])
-
-    rest = squares.sum(axis=0) - squares
-    own, rest = (s / np.maximum(s.sum(axis=1, keepdims=True), SPAN) for s in (squares, rest))
-    common = np.minimum(own, rest).sum(axis=1)
-    return float(common.sum() - common.max())
 
 
 def search_models(
@@ -204,14 +185,22 @@ def extended(
             wanted.setdefault(predicted.names, predicted)
 
     def fitted(predicted: Predicted) -> Model | None:
-        return attempted(lambda: _with_effect(search, predicted))
+        return attempted(lambda: _acting(search, _with_effect(search, predicted)))
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
     pairs = zip(wanted.values(), made, strict=True)
     failed = tuple((*p.model.names, p.effect) for p, model in pairs if model is None)
     models = (*search.models, *(model for model in made if model is not None))
-    return replace(search, models=models, failed=(*search.failed, *failed))
+    return replace(search, models=tuple(_the_better(models)), failed=(*search.failed, *failed))
+
+
+def _acting(search: EffectSearch, model: Model) -> Model:
+    """A model, or what is left of it without an effect that does nothing where its fit stands."""
+    if len(model.names) < 2:
+        return model
+    idle = [name for name, size in does(model.fitted).items() if size < SLIGHT]
+    return _acting(search, _changed(search, model, idle[0])) if idle else model
 
 
 def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
@@ -344,7 +333,7 @@ def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
         return search
 
     def changed(change: tuple[str, Model | None]) -> Model | None:
-        return attempted(lambda: _changed(search, best, *change))
+        return attempted(lambda: _acting(search, _changed(search, best, *change)))
 
     changes = [*((name, None) for name in best.names), *_rivals(search, best)]
     made = each(jobs, changed, changes, shared(search))

@@ -18,11 +18,11 @@ from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
 from gritd.tools.diagnose.fit.heldout import missed
-from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.model import Model, in_one_place
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration
-from gritd.tools.diagnose.search.search import EffectSearch, counting, in_one_place, shared, without
+from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation

@@ -15,14 +15,16 @@ from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.estimator.terramechanics.soil import Scalar
-from gritd.tools.diagnose.fit.form_error import _following, baseline_terms, form_errors
+from gritd.tools.diagnose.fit.form_error import _added, _following, baseline_terms, form_errors
+from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
-from tests.tools.diagnose.campaigns import diagnosed, plan, settings
+from tests.tools.diagnose.campaigns import LOADS, diagnosed, plan, settings
 
 pytestmark = pytest.mark.long
 
@@ -184,11 +186,16 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
 
 @pytest.mark.parametrize(
     ("name", "placed"),
-    [("side_wall_rubbing", True), ("bulldozing", True), ("viscous_friction", False)],
+    [
+        ("side_wall_rubbing", True),
+        ("bulldozing", True),
+        ("viscous_friction", False),
+        ("torque_constant_error", False),
+    ],
 )
 def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool) -> None:
     """An effect that is three tenths stronger and weaker along the bed, ten times on it, is within
-    its term to vary along the place; a friction of the drive is not.
+    its term to vary along the place; a friction of the drive is not, nor a motor's constant.
     """
     problem = _problem()
     stack, effect = problem.stack, EFFECTS[name]
@@ -204,6 +211,36 @@ def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool)
     every = np.column_stack([*(f.columns.dense for f in terms), fitted.raw[:, len(still) :]])
     left = wavy - every @ np.linalg.lstsq(every, wavy, rcond=None)[0]
     assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(wavy)) == placed
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("rear_contact", "torque_constant_error"),
+        ("rim_friction", "slip_sinkage"),
+        ("sidewall_friction", "rear_contact"),
+    ],
+)
+def test_other_forms_of_an_effect_are_shares_of_what_it_does(names: tuple[str, ...]) -> None:
+    """On a patch that neither is. An effect that a fit leaves does not explain it by other forms of
+    what it did where the fit began.
+    """
+    problem, effects = _problem_of_a_patch(), tuple(EFFECTS[name] for name in names)
+    free, still = free_of(effects), np.zeros(len(problem.stack.rig.constants))
+    model = fit_model(problem, (), effects, free, (still, np.ones(len(free))), ())
+    assert model.marginal is not None
+    for number, name in enumerate(model.names):
+        added = _added(problem.stack, model.fitted, number)
+        does = np.linalg.norm(whiten(problem.noise, added[:, None]))
+        terms = (term for term in model.marginal.terms if term.name == name)
+        assert all(np.sqrt(np.trace(term.whitened.gram)) < 8.0 * does for term in terms)
+
+
+@cache
+def _problem_of_a_patch() -> Problem:
+    change = {"cohesion_change": 0.4, "friction_change": 0.4, "centre": 0.5, "length": 0.2}
+    runs = record(plan(LOADS[:2], 30.0, wrench=False), (make("soil_patch", change),))
+    return fit_base(wheel_rig(runs, settings())).problem
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.evidence import Signature
-from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.model import Model, does, fit_model
+from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.evidence import Weighed, varied_pass
@@ -135,6 +136,31 @@ class RoughWall(SideWallRubbing):
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
         rough = 1.0 + 0.7 * np.cos(2.0 * np.pi * situation.position / 0.06)
         return SideWallRubbing.testbed(replace(self, share=self.share * rough), reaction, situation)
+
+
+def test_an_effect_that_does_nothing_leaves_the_model() -> None:
+    """A frame that does not give beside a friction: what a fit of both finds is the friction's."""
+    search = searched(make("coulomb_friction", {"loss": 0.5}))
+    friction, frame = EFFECTS["coulomb_friction"], EFFECTS["frame_compliance"]
+    alone = fit_beside(search, (friction,), [1.0])
+    both = fit_beside(search, (friction, frame), [1.0, 0.0])
+    assert does(both.fitted)["frame_compliance"] == 0.0
+
+    left = searching._acting(search, both)
+    assert left.names == ("coulomb_friction",)
+    assert left.evidence == pytest.approx(alone.evidence, abs=0.5)
+    assert searching._acting(search, alone) is alone
+
+
+def fit_beside(
+    search: EffectSearch, effects: tuple[type[Effect], ...], start: list[float]
+) -> Model:
+    """Without a discrepancy of form."""
+    begins = (np.zeros(len(search.bare.fitted.u)), np.array(start))
+    sizes = tuple(0 for _ in search.screening.forms)
+    return fit_model(
+        search.problem, search.screening.forms, effects, free_of(effects), begins, sizes
+    )
 
 
 def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -> None:

@@ -207,11 +207,11 @@ def _shrunk(made: Fitted, fitted: Fitted) -> bool:
 
 def does(fitted: Fitted) -> dict[str, float]:
     """Size of what the strengths of each effect do, whitened."""
-    does = fitted.own[:, len(fitted.u) :] * fitted.x
+    done = fitted.own[:, len(fitted.u) :] * fitted.x
     strengths = np.array([f.parameter.role == "strength" for f in fitted.free])
     of = np.array([f.name for f in fitted.free])
     names = (effect.name for effect in fitted.acting)
-    return {n: float(np.linalg.norm(does[:, strengths & (of == n)].sum(axis=1))) for n in names}
+    return {n: float(np.linalg.norm(done[:, strengths & (of == n)].sum(axis=1))) for n in names}
 
 
 def in_one_place(stack: Stack, model: Model) -> float:

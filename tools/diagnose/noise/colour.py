@@ -44,10 +44,19 @@ class Colour:
 
     def shared(self, step: float) -> float:
         """Share of the slow part by what neighbouring means over an interval [s] have in common."""
-        x = step / self.time
-        if x > 1.0:  # readings that are no means are as far apart
+        if not self._of_means(step):
             return self.slow
+        x = step / self.time
         return float(self.slow * (np.cosh(x) - 1.0) / (x - 1.0 + np.exp(-x)))
+
+    def kept(self, gaps: Array, step: float) -> Array:
+        """What the slow part keeps over gaps [s]; means over an interval are no nearer than it."""
+        apart = np.maximum(gaps, step) if self._of_means(step) else gaps
+        return np.asarray(np.exp(-apart / self.time))
+
+    def _of_means(self, step: float) -> bool:
+        """Values as far apart as slow noise lasts are readings rather than means."""
+        return step <= self.time
 
 
 @dataclass(frozen=True)
@@ -212,12 +221,11 @@ def _recursion(
     innovation (n, g). beside: (n,) or (n, g) variance of white noise beside that of each colour.
     """
     step = step_of(gaps)
-    fast_time = TUNING.noise.fast_time * step
-    times = np.array([[c.time for c in colours], [fast_time] * len(colours)])
     share = np.array([[c.shared(step) for c in colours], [c.fast for c in colours]])
     own = np.zeros(len(gaps)) if beside is None else beside
 
-    kept = np.exp(-gaps[None, :, None] / times[:, None, :])
+    fast_kept = np.exp(-gaps / (TUNING.noise.fast_time * step))
+    kept = np.stack([[c.kept(gaps, step), fast_kept] for c in colours], axis=-1)
     gain, variance = np.empty_like(kept), np.empty(kept.shape[1:])
     decays: Any = kept.swapaxes(0, 1)
     slow, fast = share[0], share[1]
@@ -259,7 +267,7 @@ def whiten_rows(noise: Noise, columns: Array, rows: Bools) -> Array:
 def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     """Of noise of a colour (n, n) at times (n,)."""
     step, apart = step_of(gaps), np.abs(time[:, None] - time[None, :])
-    slow = np.exp(-apart / colour.time)
+    slow = np.where(apart > 0.0, colour.kept(apart, step), 1.0)
     fast = np.exp(-apart / (TUNING.noise.fast_time * step))
     shared = colour.shared(step)
     white = (1.0 - shared - colour.fast) * np.eye(len(time))

@@ -208,9 +208,8 @@ def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:
     if residual.size < TUNING.rig.unrest_values:
         return np.ones(residual.size)
     step = step_of(gaps)
-    kept_slow = np.exp(-step / colour.time)
     kept_fast = np.exp(-1.0 / TUNING.noise.fast_time)
-    shared = colour.shared(step) * kept_slow + colour.fast * kept_fast
+    shared = colour.shared(step) * float(np.exp(-step / colour.time)) + colour.fast * kept_fast
     usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, TUNING.noise.least_noise))
 
     differences = np.abs(np.diff(residual, prepend=residual[0]))

@@ -67,6 +67,15 @@ def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
     np.testing.assert_allclose(root @ covariance @ root.T, np.eye(50), atol=1e-5)
 
 
+@pytest.mark.parametrize("time", [0.5, 2.0, 10.0])
+def test_values_that_are_nearer_than_the_usual_interval_are_whitened_too(time: float) -> None:
+    """A log whose readings came in bursts: no innovation is without noise."""
+    gaps = np.where(np.arange(90) % 3 == 2, 0.02, 0.5)
+    white, log_det = whiten_unit(np.eye(90), gaps, [Colour(1.0, time, 0.99)])
+    assert np.isfinite(white).all() and np.isfinite(log_det).all()
+    assert np.abs(white).max() < 100.0
+
+
 def _of_means(apart: Array, step: float, time: float) -> Array:
     """Correlation (n, n) of means over intervals of an Ornstein-Uhlenbeck process: quadrature."""
     places = (np.arange(400) + 0.5) / 400 * step

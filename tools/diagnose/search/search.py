@@ -348,7 +348,8 @@ def _rivals(search: EffectSearch, best: Model) -> Iterator[tuple[str, Model]]:
         least = alone[name].evidence - TUNING.search.little
         for rival in search.sized(1)[: TUNING.search.again]:
             instead = {*best.names, *rival.names} - {name}
-            if rival.evidence > least and not search.has(instead) and len(instead) > 1:
+            further = rival.names[0] not in best.names and not search.has(instead)
+            if further and rival.evidence > least:
                 yield name, rival
 
 

@@ -138,6 +138,15 @@ class RoughWall(SideWallRubbing):
         return SideWallRubbing.testbed(replace(self, share=self.share * rough), reaction, situation)
 
 
+def test_no_effect_stands_in_a_model_twice() -> None:
+    """Of three that are as likely alone, only one that the model lacks is tried in a place."""
+    alone = [SimpleNamespace(names=(name,), evidence=100.0) for name in "abcd"]
+    best = SimpleNamespace(names=("a", "b", "c"))
+    search = SimpleNamespace(sized=lambda size: alone, has=lambda names: False)
+    tried = searching._rivals(cast(Any, search), cast(Any, best))
+    assert [(name, rival.names) for name, rival in tried] == [(n, ("d",)) for n in "abc"]
+
+
 def test_an_effect_that_does_nothing_leaves_the_model() -> None:
     """A frame that does not give beside a friction: what a fit of both finds is the friction's."""
     search = searched(make("coulomb_friction", {"loss": 0.5}))

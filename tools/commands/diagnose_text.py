@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from gritd.estimator.visible import visible
-from gritd.tools.cli.wording import chance, number, percent, shown, spelled
+from gritd.tools.cli.wording import chance, number, percent, shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
     Fit,
@@ -67,10 +67,16 @@ def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> Iterator[str]:
     head = f"  {'accepted' if of.accepted else other}: {of.effect}"
     head += f", probability {of.probability:.{DIGITS}f}"
     head += f", form error {percent(of.other_forms)}" if of.other_forms else ""
-    values = _listed(of.known)
+    values = "; ".join(filter(None, (_listed(of.known), *_profile(of))))
     yield f"{head}{f': {values}' if values else ''}"
     if of.accepted:
         yield from (f"    {line}" for line in of.equation.splitlines())
+
+
+def _profile(of: Hypothesis) -> Iterator[str]:
+    for channel, q in of.profile.items():
+        unit, factor = shown(q.unit)
+        yield f"with its profile it moves {spelled(channel)} by {spaced(q.value * factor, unit, 2)}"
 
 
 def _had(reference: Reference | None) -> Iterator[str]:

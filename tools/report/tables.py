@@ -25,6 +25,11 @@ def parameters(diagnosis: Diagnosis) -> Markup | None:
     parameters = [
         (h.effect, name, q) for h in diagnosis.accepted for name, q in h.parameters.items()
     ]
+    parameters += [
+        (h.effect, f"{name_of(channel)} from lowest to highest", q)
+        for h in diagnosis.accepted
+        for channel, q in h.profile.items()
+    ]
     had = diagnosis.reference.effects if diagnosis.reference is not None else {}
     parameters += [
         (f"{effect} in both campaigns", name, q)

@@ -15,6 +15,7 @@ from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
+from gritd.tools.diagnose.explain.profile import profile_of
 from gritd.tools.diagnose.explain.remainder import discrepancies, missed_words, remainders
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
@@ -145,6 +146,7 @@ def _hypotheses(
                 score_nats=search.first.evidence.get(name, 0.0),
                 separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
                 other_forms=forms,
+                profile=profile_of(search.problem, best, name) if best else {},
             )
         )
 

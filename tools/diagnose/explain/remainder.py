@@ -23,12 +23,12 @@ ALONG = [(name,) for name in ("slip", "load", "speed", "position", "time", "whee
 
 
 def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
-    """Of each channel: what the model predicts without its discrepancies, against the recording,
-    beyond the noise.
+    """Of each channel: what the model predicts without its discrepancies but with the profiles of
+    its effects, against the recording, beyond the noise.
     """
     stack, rig, found = problem.stack, problem.stack.rig, {}
     every = smooth_signatures(stack, everywhere=True)
-    left = stack.measured - model.fitted.predicted
+    left = stack.measured - model.fitted.predicted - model.profiles()[0]
 
     for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
         squares = float(np.mean(left[stack.of(channel)] ** 2)) - colour.sigma**2

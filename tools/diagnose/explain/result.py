@@ -77,6 +77,8 @@ class Hypothesis:
 
     other_forms: of an accepted effect, the share by which what it does may differ where it is
         driven otherwise: published forms of it do.
+    profile: channel -> from lowest to highest, what an effect moves it by that goes along what no
+        law tells of; of that its parameters state a part only.
     """
 
     effect: str
@@ -91,6 +93,7 @@ class Hypothesis:
     # rival -> what would distinguish them, in words
     separated_by: Mapping[str, str] = field(default_factory=dict)
     other_forms: float = 0.0
+    profile: Mapping[str, Quantity] = field(default_factory=dict)
 
     @property
     def known(self) -> Mapping[str, Quantity]:

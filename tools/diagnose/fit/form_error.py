@@ -57,7 +57,7 @@ def form_error_sizes() -> Sizes:
 def form_errors(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[RandomEffect, ...]:
     """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
     numbered = enumerate(fitted.acting)
-    acting = [_Acting(effect, _added(stack, fitted, number)) for number, effect in numbered]
+    acting = [_Acting(effect, added_by(stack, fitted, number)) for number, effect in numbered]
     own = np.arange(len(fitted.u), len(fitted.centre))
     return _forms_of(stack, noise, fitted, acting, own)
 
@@ -171,7 +171,7 @@ def _place_sizes() -> Sizes:
     return Sizes(TUNING.fit.place_sizes, TUNING.fit.place_prior)
 
 
-def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
+def added_by(stack: Stack, fitted: Fitted, number: int) -> Array:
     """Prediction with an effect less that without it (N,); 0 where the others alone run away."""
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)

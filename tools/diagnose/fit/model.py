@@ -67,9 +67,11 @@ class Model:
         assert self.marginal is not None
         return self.marginal.moments(self.chosen, self.marginal.place_of(number))[0]
 
-    def profiles(self) -> Array:
-        """What effects amount to beyond our formula (N,), whitened, along what no law tells of."""
-        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, profile=True)[1]
+    def profiles(self, name: str | None = None) -> tuple[Array, Array]:
+        """What effects, or one of them, amount to beyond our formula (N,) along what no law tells
+        of: in the channels' units, and whitened.
+        """
+        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, True, name)
 
     @property
     def _of_form(self) -> int:
@@ -78,15 +80,19 @@ class Model:
         sizes = _values(terms[: len(self.sizes)], self.sizes) if terms else []
         return sum(size > 0.0 for size in sizes)
 
-    def _amount(self, begin: int, end: int, profile: bool = False) -> tuple[Array, Array]:
-        """Of the acting terms begin … end − 1, beside what every fit has; profile: of some only."""
+    def _amount(
+        self, begin: int, end: int, profile: bool = False, name: str | None = None
+    ) -> tuple[Array, Array]:
+        """Of the acting terms begin … end − 1, beside what every fit has; profile, name: of some
+        only.
+        """
         nuisance, slack = self.fitted.nuisance, self.fitted.slack
         ends = np.cumsum([term.columns.count for term, _ in nuisance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
             term, size = nuisance.parts[number]
-            if profile and not term.profile:
+            if (profile and not term.profile) or name not in (None, term.name):
                 continue
             weights = slack[ends[number - 1] : ends[number]]
             own = own + size * term.columns.times(weights)

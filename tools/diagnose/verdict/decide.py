@@ -258,7 +258,7 @@ def taken_share(search: EffectSearch, model: Model) -> float:
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
 
-    left = [off.residual - shared, fitted.residual - shared - model.profiles()]
+    left = [off.residual - shared, fitted.residual - shared - model.profiles()[1]]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 

@@ -15,7 +15,7 @@ from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.estimator.terramechanics.soil import Scalar
-from gritd.tools.diagnose.fit.form_error import _added, _following, baseline_terms, form_errors
+from gritd.tools.diagnose.fit.form_error import _following, added_by, baseline_terms, form_errors
 from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
@@ -230,7 +230,7 @@ def test_other_forms_of_an_effect_are_shares_of_what_it_does(names: tuple[str, .
     model = fit_model(problem, (), effects, free, (still, np.ones(len(free))), ())
     assert model.marginal is not None
     for number, name in enumerate(model.names):
-        added = _added(problem.stack, model.fitted, number)
+        added = added_by(problem.stack, model.fitted, number)
         does = np.linalg.norm(whiten(problem.noise, added[:, None]))
         terms = (term for term in model.marginal.terms if term.name == name)
         assert all(np.sqrt(np.trace(term.whitened.gram)) < 8.0 * does for term in terms)
@@ -272,8 +272,11 @@ class _KeyedHub(HubRunout):
 def test_a_hub_of_any_profile_takes_the_misfit() -> None:
     """What it does beyond one cycle a turn is its own, not something else that resembles a hub."""
     found = diagnosed(plan(seconds=60.0), (_KeyedHub(1.0),))
-    assert [h.effect for h in found.accepted] == ["hub_runout"]
-    assert found.share > 0.9
+    (hub,) = found.accepted
+    assert hub.effect == "hub_runout" and found.share > 0.9
+    assert list(hub.profile) == ["sinkage"]
+    assert hub.profile["sinkage"].value == pytest.approx(1e-3, rel=0.1)
+    assert found.remaining["sinkage"].rms < 0.03e-3
 
 
 def test_no_law_says_what_profile_a_hub_has() -> None:

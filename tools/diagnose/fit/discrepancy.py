@@ -34,7 +34,9 @@ def form_terms(stack: Stack, noise: Noise) -> tuple[RandomEffect, ...]:
             lost = source.drive and stack.rig.loss_of_drive
             sizes = _drive_sizes() if lost else form_sizes()
             terms.append(
-                random_effect(source.name, columns, noise, sizes, of_form=not source.drive)
+                random_effect(
+                    source.name, columns, noise, sizes, kind="" if source.drive else "form"
+                )
             )
     return tuple(terms)
 

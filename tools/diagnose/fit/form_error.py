@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
+from gritd.tools.diagnose.fit.random_effect import Kind, RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
@@ -104,12 +105,14 @@ def _forms_of(
     named = np.column_stack((fitted.raw[:, own], stack.named))
     made: list[RandomEffect] = []
     for one in (one for one in acting if np.any(one.added)):
-        for columns, sizes in _profiles(stack, noise, one):
+        kinds: Iterator[tuple[Kind, Array, Sizes, int]] = chain(
+            (("profile", *profile, 0) for profile in _profiles(stack, noise, one)),
+            (("place", *varied, 0) for varied in _varied(one, places)),
+            (("law", *_other_laws(stack, noise, fitted, one, functions)),),
+        )
+        for kind, columns, sizes, least in kinds:
             free = _beside(noise, columns, named)
-            made.append(random_effect(one.effect.name, free, noise, sizes, profile=True))
-        for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places):
-            other = _beside(noise, columns, named)
-            made.append(random_effect(one.effect.name, other, noise, sizes, least))
+            made.append(random_effect(one.effect.name, free, noise, sizes, least, kind))
     return tuple(made)
 
 
@@ -122,25 +125,30 @@ def _profiles(stack: Stack, noise: Noise, one: _Acting) -> Iterator[tuple[Array,
         yield _share(one.added, harmonics), sizes
 
 
-def _other_forms(
-    stack: Stack, noise: Noise, fitted: Fitted, one: _Acting, functions: Array, places: Array
-) -> Iterator[tuple[Array, Sizes, int]]:
-    """Of one effect, columns (N, m) with their sizes and the smallest of these that counts for the
-    uncertainty of the constants; the narrower first, since other forms can imitate them.
+def _varied(one: _Acting, places: Array) -> Iterator[tuple[Array, Sizes]]:
+    """Of one effect, how it may vary along the bed: columns (N, m) with their sizes. places (N, p):
+    functions of the place.
+    """
+    if _placed(type(one.effect)) and places.shape[1]:
+        yield _share(one.added, places), _place_sizes()
 
-    functions (N, f): of the conditions; places (N, p): along the bed.
+
+def _other_laws(
+    stack: Stack, noise: Noise, fitted: Fitted, one: _Acting, functions: Array
+) -> tuple[Array, Sizes, int]:
+    """Of one effect, how else published forms of it differ: columns (N, m) with their sizes, and
+    the smallest of these that counts for the uncertainty of the constants.
+
+    functions (N, f): of the conditions.
     """
     effect, added = one.effect, one.added
-    if _placed(type(effect)) and places.shape[1]:
-        yield _share(added, places), _place_sizes(), 0
-
     columns = _share(added, np.column_stack((functions, _by_channel(stack, added), np.sign(added))))
     if effect.stage in OF_SOIL:
         columns = np.column_stack((columns, _following(stack, added)))
     if effect.stage == OF_SHEAR:
         displaced = _displaced(stack, noise, fitted, added)
         columns = np.column_stack((columns, _share(displaced, functions)))
-    yield columns, form_error_sizes(), 0 if effect.stage in EXACT else 1
+    return columns, form_error_sizes(), 0 if effect.stage in EXACT else 1
 
 
 def _share(added: Array, functions: Array) -> Array:

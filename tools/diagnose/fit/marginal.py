@@ -185,9 +185,9 @@ class Marginal:
         """The smallest sizes that count for what is not known. Where the equations miss one channel
         by much, no other one is right to the last digit: the soil would be bent until it seems so.
         """
-        of_form = [n for n, f in zip(chosen, self.terms, strict=True) if f.of_form]
+        of_form = [n for n, f in zip(chosen, self.terms, strict=True) if f.kind == "form"]
         alike = max(of_form, default=0) - TUNING.fit.form_apart
-        return tuple(max(f.least, alike) if f.of_form else f.least for f in self.terms)
+        return tuple(max(f.least, alike) if f.kind == "form" else f.least for f in self.terms)
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""

@@ -11,7 +11,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.form_error import baseline_terms, form_errors
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
-from gritd.tools.diagnose.fit.random_effect import RandomEffect
+from gritd.tools.diagnose.fit.random_effect import Kind, RandomEffect
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
@@ -92,31 +92,30 @@ class Model:
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
             term, size = nuisance.parts[number]
-            if (profile and not term.profile) or name not in (None, term.name):
+            if (profile and term.kind != "profile") or name not in (None, term.name):
                 continue
             weights = slack[ends[number - 1] : ends[number]]
             own = own + size * term.columns.times(weights)
             whitened = whitened + size * term.whitened.times(weights)
         return own, whitened
 
-    def of_forms(self, name: str) -> Array | None:
-        """Log likelihood (h,) of each size by which an effect may act in another form than ours,
-        the other terms as chosen; None where it has no other form.
+    def log_likelihoods(self, name: str, kind: Kind) -> Array | None:
+        """Of each size (h,) of one term of an effect, the others as chosen; None where it has none
+        of this kind.
         """
-        own = self._form_of(name)
+        own = self._term_of(name, kind)
         if self.marginal is None or own is None:
             return None
         return self.marginal.log_likelihoods(self.chosen, own)
 
-    def _form_of(self, name: str) -> int | None:
-        """Which term holds other forms of an effect: the last of its own."""
-        every = list(enumerate(self.marginal.terms if self.marginal else ()))
-        own = [number for number, term in every[len(self.sizes) :] if term.name == name]
-        return own[-1] if own else None
+    def _term_of(self, name: str, kind: Kind) -> int | None:
+        """Which of the terms it is."""
+        terms = enumerate(self.marginal.terms if self.marginal else ())
+        return next((n for n, term in terms if (term.name, term.kind) == (name, kind)), None)
 
     def form_share(self, name: str) -> float:
         """Root mean square share by which an effect may act in another form than ours."""
-        own = self._form_of(name)
+        own = self._term_of(name, "law")
         if self.marginal is None or own is None:
             return 0.0
         return self.marginal.size_of(self.chosen, own)

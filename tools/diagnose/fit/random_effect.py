@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,6 +17,8 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.columns import Columns, columns_of, whitened
 from gritd.tools.diagnose.noise.colour import Noise
+
+Kind = Literal["", "form", "profile", "place", "law"]
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,9 @@ class RandomEffect:
     """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise.
 
     least: the number of the smallest size that counts for the uncertainty of the constants.
-    of_form: whether it is what the equations of a wheel in soil miss of some channel.
-    profile: whether it is how an effect goes along what no law tells of.
+    kind: `form` is what the equations of a wheel in soil miss of some channel; of an effect
+        `profile` is how it goes along what no law tells of, `place` how it varies along the bed,
+        `law` how else published forms of it differ; empty for all other.
     """
 
     name: str
@@ -56,8 +60,7 @@ class RandomEffect:
     whitened: Columns
     sizes: Sizes
     least: int = 0
-    of_form: bool = False
-    profile: bool = False
+    kind: Kind = ""
 
 
 def random_effect(
@@ -66,12 +69,11 @@ def random_effect(
     noise: Noise,
     sizes: Sizes,
     least: int = 0,
-    of_form: bool = False,
-    profile: bool = False,
+    kind: Kind = "",
 ) -> RandomEffect:
     """The term of columns (N, m) in the channels' units."""
     own = columns_of(columns)
-    return RandomEffect(name, own, whitened(noise, own), sizes, least, of_form, profile)
+    return RandomEffect(name, own, whitened(noise, own), sizes, least, kind)
 
 
 def products(parts: Sequence[RandomEffect]) -> Array:

@@ -8,6 +8,8 @@ from gritd.tools.diagnose.tuning.field import tuned
 
 COUNTED = "94 names of plants of other forms: 2 of 69 right ones needed 0.4, 18 of 25 wrong ones"
 
+PLACED = "44 likeliest explanations: 2 of 26 right ones needed any, 8 of 18 wrong ones did"
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -53,6 +55,12 @@ class Verdict:
         "prior",
         "of the form error of an effect that something resembles",
         COUNTED,
+    )
+    place_own: tuple[float, ...] = tuned(
+        (0.90, 0.07, 0.03), "prior", "of what varies with the place, of an effect there", PLACED
+    )
+    place_other: tuple[float, ...] = tuned(
+        (0.53, 0.14, 0.33), "prior", "the same of what resembles it", PLACED
     )
     worse: float = tuned(
         0.25,

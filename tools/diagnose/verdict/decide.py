@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from gritd.estimator.effects import EFFECTS
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
@@ -98,7 +99,8 @@ def judged(
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
     to be there than to be resembled, and likelier than that nothing of the list is there. Where
-    runs that were held out are predicted worse with what would be accepted, it is less likely.
+    runs that were held out are predicted worse with what would be accepted, it is less likely, but
+    for zeros that are set anew before each run.
     """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
@@ -113,7 +115,7 @@ def judged(
     first = _accepted(every, best)
     named, share, whole = _named(search, best, first, beside)
     if named.names and not _predicts(search, whole.model if whole is not None else named):
-        every = tuple(_doubted(w, first) for w in every)
+        every = tuple(_doubted(w, [n for n in first if not EFFECTS[n].free_along]) for w in every)
         named, share, whole = _named(search, best, _accepted(every, best), beside)
 
     return Decision(

@@ -9,7 +9,8 @@ lesser share s. With the share λ of explanations that mislead (calibration.py)
 
     P(effect) = Σ L(h) (1 − λ) p(h, s | effect) / Σ L(h) [(that) + λ p(h, s | other)]
 
-where p(h, s | …) = p(h | …) k sᵏ⁻¹. L is not tempered as evidence between explanations is: both
+where p(h, s | …) = p(h | …) k sᵏ⁻¹. How far it must vary with the place on the bed counts as h
+does. L is not tempered as evidence between explanations is: both
 priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
 of it h says nothing. Where runs that were held out are predicted worse with the effect, its odds
 are lower: of what only resembles it that is oftener so.
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
@@ -33,14 +35,27 @@ def trusted(rig: Rig, model: Model, share: float, by: OddsCalibration) -> tuple[
     """Of each effect of a model, the probability that it is there, if the model is the best
     explanation and takes such a share of the misfit.
     """
-    return tuple(believed(_likelihood(rig, model, name), share, by.lapse) for name in model.names)
+    return tuple(
+        believed(_of_law(rig, model, name), _of_place(model, name), share, by.lapse)
+        for name in model.names
+    )
 
 
-def believed(likelihood: Array, share: float, lapse: float) -> float:
-    """Probability that an effect is there. likelihood (h,): of each size of its form error."""
-    own, other = np.array(TUNING.verdict.form_own), np.array(TUNING.verdict.form_other)
-    there = (1.0 - lapse) * _of_share(share, TUNING.verdict.share_power) * float(likelihood @ own)
-    alike = lapse * _of_share(share, TUNING.verdict.share_power_other) * float(likelihood @ other)
+def believed(law: Array | None, place: Array | None, share: float, lapse: float) -> float:
+    """Probability that an effect is there. law (h,), place (p,): log likelihood of each size of its
+    form error, and of what varies with the place; None where that says nothing.
+    """
+    by = TUNING.verdict
+    there = (1.0 - lapse) * _of_share(share, by.share_power)
+    alike = lapse * _of_share(share, by.share_power_other)
+    for known, own, other in (
+        (law, by.form_own, by.form_other),
+        (place, by.place_own, by.place_other),
+    ):
+        if known is not None:
+            likelihood = np.exp(known - known.max())
+            there *= float(likelihood @ np.array(own))
+            alike *= float(likelihood @ np.array(other))
     return float(there / max(there + alike, SPAN))
 
 
@@ -60,13 +75,18 @@ def _of_share(share: float, power: float) -> float:
     return float(power * share ** (power - 1.0))
 
 
-def _likelihood(rig: Rig, model: Model, name: str) -> Array:
-    """Of each size of the form error (h,), the largest 1; alike where h says nothing."""
+def _of_law(rig: Rig, model: Model, name: str) -> Array | None:
+    """Log likelihood of each size of the form error (h,)."""
     effect = next(one for one in model.fitted.acting if one.name == name)
-    likelihood = None if _has_line(rig, effect) else model.of_forms(name)
-    if likelihood is None:
-        return np.ones(len(TUNING.fit.form_error_sizes))
-    return np.asarray(np.exp(likelihood - likelihood.max()))
+    return None if _has_line(rig, effect) else model.log_likelihoods(name, "law")
+
+
+def _of_place(model: Model, name: str) -> Array | None:
+    """The same of what varies with the place (p,); of what goes with it by itself that says
+    nothing.
+    """
+    goes = EFFECTS[name].fingerprint.covariate == "position"
+    return None if goes else model.log_likelihoods(name, "place")
 
 
 def _has_line(rig: Rig, effect: Effect) -> bool:

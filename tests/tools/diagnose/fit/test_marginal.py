@@ -81,8 +81,8 @@ def test_the_soil_is_told_with_no_channel_exact_beside_one_missed_by_much() -> N
     marginal, _ = _marginal(0)
     loose, _ = _marginal(0)
     sizes = Sizes((0.0, 0.003, 0.01, 0.03, 0.1, 0.3), (1.0,) * 6)
-    for one, of_form in ((marginal, True), (loose, False)):
-        one.terms = tuple(replace(f, sizes=sizes, of_form=of_form) for f in one.terms)
+    for one, kind in ((marginal, "form"), (loose, "")):
+        one.terms = tuple(replace(f, sizes=sizes, kind=kind) for f in one.terms)
 
     chosen = (5, 0)
     assert marginal._least(chosen) == (3, 3)

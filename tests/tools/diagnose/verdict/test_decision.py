@@ -100,15 +100,17 @@ def _searched(bare: Fit) -> Any:
     return SimpleNamespace(bare=bare, base=bare, screening=None, problem=None)
 
 
-def _judged(listed: float, nameless: float, trust: float, parameters: int = 1) -> Any:
+def _judged(
+    listed: float, nameless: float, trust: float, parameters: int = 1, name: str = "bulldozing"
+) -> Any:
     """One effect that is so far to be trusted against unexplained terms, of so much evidence
     each [nats].
     """
-    bare, best = Fit((), 0), Fit(("a",), parameters)
+    bare, best = Fit((), 0), Fit((name,), parameters)
     search = _searched(bare)
     weighed: Any = [
         decide.WeighedExplanation(bare, (), 0, 0.0),
-        decide.WeighedExplanation(best, ("a",), 0, listed, share=0.9, trust=(trust,)),
+        decide.WeighedExplanation(best, (name,), 0, listed, share=0.9, trust=(trust,)),
         decide.WeighedExplanation(bare, (), 1, nameless),
     ]
     return decide.judged(search, weighed, {}, learnt(30))
@@ -116,31 +118,33 @@ def _judged(listed: float, nameless: float, trust: float, parameters: int = 1) -
 
 def test_the_verdict_is_that_of_the_evidence(names_alone: None) -> None:
     named = _judged(900.0, 200.0, 0.9)
-    assert named.verdict == "explained" and named.best.names == ("a",)
-    assert named.probability["a"] == pytest.approx(0.9) and not named.resembled
+    assert named.verdict == "explained" and named.best.names == ("bulldozing",)
+    assert named.probability["bulldozing"] == pytest.approx(0.9) and not named.resembled
 
     strange = _judged(200.0, 900.0, 0.9)
     assert strange.verdict == "unlisted" and strange.best.names == ()
-    assert strange.probability["a"] + strange.unlisted == pytest.approx(1.0)
+    assert strange.probability["bulldozing"] + strange.unlisted == pytest.approx(1.0)
 
 
 def test_what_is_likelier_resembled_than_there_is_not_named(
     names_alone: None,
 ) -> None:
     found = _judged(900.0, 200.0, 0.2)
-    assert found.verdict == "unlisted" and found.probability["a"] == pytest.approx(0.2)
-    assert [(r.name, r.share, r.forms) for r in found.resembled] == [("a", 0.9, 0.4)]
+    assert found.verdict == "unlisted" and found.probability["bulldozing"] == pytest.approx(0.2)
+    assert [(r.name, r.share, r.forms) for r in found.resembled] == [("bulldozing", 0.9, 0.4)]
 
 
 def test_what_predicts_unseen_runs_worse_is_less_likely(names_alone: None) -> None:
     """As well as without it is not better."""
     found = _judged(900.0, 200.0, 0.7, parameters=0)
     assert found.verdict == "unlisted" and found.best.names == () and found.share == 0.0
-    assert [(r.name, r.predicts) for r in found.resembled] == [("a", False)]
-    assert found.probability["a"] < 0.5 < found.unlisted
+    assert [(r.name, r.predicts) for r in found.resembled] == [("bulldozing", False)]
+    assert found.probability["bulldozing"] < 0.5 < found.unlisted
+
+    assert _judged(900.0, 200.0, 0.7, 0, "sensor_drift").verdict == "explained"  # a zero set anew
 
     sure = _judged(900.0, 200.0, 0.9, parameters=0)
-    assert sure.best.names == ("a",) and 0.5 < sure.probability["a"] < 0.8
+    assert sure.best.names == ("bulldozing",) and 0.5 < sure.probability["bulldozing"] < 0.8
 
 
 def test_no_name_is_stated_that_is_less_likely_than_none(names_alone: None) -> None:
@@ -186,10 +190,21 @@ def test_a_simpler_name_that_is_less_likely_than_none_comes_after_one_that_is_li
 
 def test_a_form_error_that_no_published_law_needs_tells_against_a_name() -> None:
     """As much likelihood without bending and with it says little; bending that pays says much."""
-    straight, open_, bent = np.exp([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])
-    believed = [resemblance.believed(shown, 0.9, 0.13) for shown in (straight, open_, bent)]
+    straight, open_, bent = np.array([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])
+    believed = [resemblance.believed(law, None, 0.9, 0.13) for law in (straight, open_, bent)]
     assert believed[0] > 0.97 > believed[1] > 0.5 and believed[2] < 0.5
-    assert resemblance.believed(straight, 0.05, 0.13) < believed[0]
+    assert resemblance.believed(straight, None, 0.05, 0.13) < believed[0]
+
+
+def test_an_effect_that_is_there_on_a_part_of_the_bed_only_is_doubted() -> None:
+    """The same strength all along says for it; where the place is open it stays as it is."""
+    even, open_, placed = np.array([[0.0, -9, -9], [0.0, 0, 0], [-9.0, -9, 0]])
+    law = np.array([0.0, 0, -9, -9])
+    believed = [resemblance.believed(law, of, 0.9, 0.13) for of in (even, open_, placed)]
+    alone = resemblance.believed(law, None, 0.9, 0.13)
+    assert believed[0] > alone > believed[2] and believed[1] == pytest.approx(alone)
+    bent = np.array([-9.0, -9, -9, 0])
+    assert resemblance.believed(bent, placed, 0.9, 0.13) < 0.2
 
 
 def test_explanations_with_one_and_with_two_effects_stand_together_against_none(

@@ -8,8 +8,6 @@ from gritd.tools.diagnose.tuning.field import tuned
 
 COUNTED = "94 names of plants of other forms: 2 of 69 right ones needed 0.4, 18 of 25 wrong ones"
 
-PLACED = "44 likeliest explanations: 2 of 26 right ones needed any, 8 of 18 wrong ones did"
-
 
 @dataclass(frozen=True)
 class Verdict:
@@ -56,11 +54,11 @@ class Verdict:
         "of the form error of an effect that something resembles",
         COUNTED,
     )
-    place_own: tuple[float, ...] = tuned(
-        (0.90, 0.07, 0.03), "prior", "of what varies with the place, of an effect there", PLACED
-    )
-    place_other: tuple[float, ...] = tuned(
-        (0.53, 0.14, 0.33), "prior", "the same of what resembles it", PLACED
+    place_odds: tuple[float, ...] = tuned(
+        (1.0, 0.4, 0.1),
+        "odds",
+        "of an effect there against one resembled, for each of `fit.place_sizes`",
+        "44 likeliest explanations: 2 of 26 right ones needed any, 8 of 18 wrong ones did",
     )
     worse: float = tuned(
         0.25,

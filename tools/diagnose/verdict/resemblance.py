@@ -9,8 +9,8 @@ lesser share s. With the share λ of explanations that mislead (calibration.py)
 
     P(effect) = Σ L(h) (1 − λ) p(h, s | effect) / Σ L(h) [(that) + λ p(h, s | other)]
 
-where p(h, s | …) = p(h | …) k sᵏ⁻¹. How far it must vary with the place on the bed counts as h
-does. L is not tempered as evidence between explanations is: both
+where p(h, s | …) = p(h | …) k sᵏ⁻¹. The odds of what must vary with the place on the bed are
+lower. L is not tempered as evidence between explanations is: both
 priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
 of it h says nothing. Where runs that were held out are predicted worse with the effect, its odds
 are lower: of what only resembles it that is oftener so.
@@ -23,6 +23,7 @@ import numpy as np
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.search.calibration import OddsCalibration
@@ -42,20 +43,18 @@ def trusted(rig: Rig, model: Model, share: float, by: OddsCalibration) -> tuple[
 
 
 def believed(law: Array | None, place: Array | None, share: float, lapse: float) -> float:
-    """Probability that an effect is there. law (h,), place (p,): log likelihood of each size of its
-    form error, and of what varies with the place; None where that says nothing.
+    """Probability that an effect is there. law (h,): log likelihood of each size of its form error;
+    place (p,): log evidence of each share that varies with the place; None where that says nothing.
     """
     by = TUNING.verdict
     there = (1.0 - lapse) * _of_share(share, by.share_power)
     alike = lapse * _of_share(share, by.share_power_other)
-    for known, own, other in (
-        (law, by.form_own, by.form_other),
-        (place, by.place_own, by.place_other),
-    ):
-        if known is not None:
-            likelihood = np.exp(known - known.max())
-            there *= float(likelihood @ np.array(own))
-            alike *= float(likelihood @ np.array(other))
+    if law is not None:
+        likelihood = np.exp(law - law.max())
+        there *= float(likelihood @ np.array(by.form_own))
+        alike *= float(likelihood @ np.array(by.form_other))
+    if place is not None:
+        there *= float(np.exp(place - log_sum(place)) @ np.array(by.place_odds))
     return float(there / max(there + alike, SPAN))
 
 
@@ -82,11 +81,12 @@ def _of_law(rig: Rig, model: Model, name: str) -> Array | None:
 
 
 def _of_place(model: Model, name: str) -> Array | None:
-    """The same of what varies with the place (p,); of what goes with it by itself that says
-    nothing.
+    """Log evidence of each share that varies with the place (p,); of what goes with it by itself
+    that says nothing.
     """
     goes = EFFECTS[name].fingerprint.covariate == "position"
-    return None if goes else model.log_likelihoods(name, "place")
+    known = None if goes else model.log_likelihoods(name, "place")
+    return None if known is None else known + np.log(TUNING.fit.place_prior)
 
 
 def _has_line(rig: Rig, effect: Effect) -> bool:

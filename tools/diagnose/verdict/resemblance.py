@@ -46,15 +46,14 @@ def believed(law: Array | None, place: Array | None, share: float, lapse: float)
     """Probability that an effect is there. law (h,): log likelihood of each size of its form error;
     place (p,): log evidence of each share that varies with the place; None where that says nothing.
     """
-    by = TUNING.verdict
-    there = (1.0 - lapse) * _of_share(share, by.share_power)
-    alike = lapse * _of_share(share, by.share_power_other)
+    there = (1.0 - lapse) * _of_share(share, TUNING.verdict.share_power)
+    alike = lapse * _of_share(share, TUNING.verdict.share_power_other)
     if law is not None:
         likelihood = np.exp(law - law.max())
-        there *= float(likelihood @ np.array(by.form_own))
-        alike *= float(likelihood @ np.array(by.form_other))
+        there *= float(likelihood @ np.array(TUNING.verdict.form_own))
+        alike *= float(likelihood @ np.array(TUNING.verdict.form_other))
     if place is not None:
-        there *= float(np.exp(place - log_sum(place)) @ np.array(by.place_odds))
+        there *= float(np.exp(place - log_sum(place)) @ np.array(TUNING.verdict.place_odds))
     return float(there / max(there + alike, SPAN))
 
 

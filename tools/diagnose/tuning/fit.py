@@ -12,7 +12,6 @@ DRIVE_SIZES = (0.0, 0.003, 0.01, 0.03, 0.1)
 DRIVE_PRIOR = (0.3, 0.25, 0.25, 0.15, 0.05)
 PUBLISHED = "judgement: docs/diagnosis.md, Discrepancy of form"
 FORMS = "differences of published formulas"
-DAMPED = "damping of a mean over an interval"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ import pytest
 from scipy.stats import norm
 
 from gritd.estimator.effects import EFFECTS, make
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, turning
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.fit.columns import whole
 from gritd.tools.diagnose.fit.evidence import strength_sizes
@@ -31,7 +33,6 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict import decide, resemblance
 from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth, main, read
 from gritd.tools.proof.ours.cases import record
-from gritd.tools.proof.ours.other_forms import HessSoomFriction
 from tests.tools.diagnose.campaigns import plan, settings
 
 
@@ -42,6 +43,19 @@ def _model(acting: Sequence[Effect], name: str) -> Model:
     free = free_of((EFFECTS[name],))
     start = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
     return fit_model(base.problem, (), (EFFECTS[name],), free, (base.fitted.u, start), ())
+
+
+@dataclass(frozen=True)
+class HessSoomFriction(Effect):
+    """Break-away friction as T_S/(1 + (ω/ω_S)²) (Hess and Soom 1990)."""
+
+    size: float = strength("size", "", typical=0.6, low=0.0, high=1e6)
+    stage = "drivetrain"
+    fingerprint = Fingerprint("torque", "constant", "")
+
+    def torque_loss(self, situation: Situation) -> Scalar:
+        speed = situation.wheel_speed
+        return self.size / (1.0 + (speed / 0.12) ** 2) * turning(speed)
 
 
 def test_another_published_form_keeps_its_name() -> None:

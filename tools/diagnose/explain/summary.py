@@ -54,7 +54,8 @@ def summary(
     names = [_likely(decision, name) for name in decision.best.names]
     verb = "explains" if len(names) == 1 else "explain"
     sentences.append(f"{listed(names)} {verb} {percent(decision.share)} of the misfit.")
-    return " ".join((*_worse(fit), *sentences, *_alike(decision), *_beside(decision)))
+    worst = _worse(fit, decision.best.names)
+    return " ".join((*worst, *sentences, *_alike(decision), *_beside(decision)))
 
 
 def worse(fit: Fit) -> list[str]:
@@ -82,10 +83,15 @@ def _off(fit: Fit, channel: str, named: bool = True) -> str:
     return f"{before} {unit} off before, {after} after" if named else f"{before} {unit} off"
 
 
-def _worse(fit: Fit) -> Iterator[str]:
+def _worse(fit: Fit, names: Sequence[str]) -> Iterator[str]:
+    """names: of the effects that are accepted."""
     if far := worse(fit):
         each = listed([f"{spelled(c)} on unseen runs {_off(fit, c)}" for c in far])
-        yield f"In part only: {each}. Check sign, scale and place of this in the configuration."
+        free = [name for name in names if EFFECTS[name].free_along]
+        check = "Check sign, scale and place of this in the configuration."
+        if free:
+            check = f"No run foretells what {listed(free)} does in another."
+        yield f"In part only: {each}. {check}"
 
 
 def _likely(decision: Decision, name: str) -> str:

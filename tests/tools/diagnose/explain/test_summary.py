@@ -41,8 +41,15 @@ def test_a_channel_that_is_foretold_worse_comes_first() -> None:
     """A torque that is mapped to the wrong side of a friction."""
     fit = _fit((0.16, 0.27))
     assert worse(fit) == ["torque"] and not worse(_fit((0.3, 0.02)))
-    shown = summary(_decision("explained", "a"), [PLACE], fit, SCREEN, RIG)
+    shown = summary(_decision("explained", "coulomb_friction"), [PLACE], fit, SCREEN, RIG)
     assert shown.startswith("In part only: torque") and "0.16" in shown and "0.27" in shown
+    assert "configuration" in shown
+
+
+def test_a_zero_that_no_run_foretells_is_no_fault_of_the_configuration() -> None:
+    decision = _decision("explained", "sensor_drift")
+    shown = summary(decision, [PLACE], _fit((0.16, 0.27)), SCREEN, RIG)
+    assert "what sensor_drift does" in shown and "configuration" not in shown
 
 
 @pytest.mark.parametrize("names", [("a",), ("a", "b")])

@@ -17,8 +17,8 @@ from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
-from gritd.tools.proof.ours.unlisted import BentRail, CableChainDrag
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
+from tests.tools.diagnose.unlisted import BentRail, CableChainDrag
 
 
 def frees_the_soil(found: Diagnosis) -> bool:

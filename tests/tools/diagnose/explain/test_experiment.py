@@ -10,8 +10,8 @@ import pytest
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.proof.ours.unlisted import CableChainDrag
 from tests.tools.diagnose.campaigns import diagnosed, plan
+from tests.tools.diagnose.unlisted import CableChainDrag
 
 
 def proposed(found: Diagnosis) -> str:

@@ -23,8 +23,8 @@ from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
 from gritd.tools.proof.ours.cases import draw, record
-from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
+from tests.tools.diagnose.unlisted import NextDoor
 
 pytestmark = pytest.mark.long
 

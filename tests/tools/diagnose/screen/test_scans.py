@@ -25,8 +25,8 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import EffectSearch, begin
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.coloured import coloured
-from gritd.tools.proof.ours.unlisted import NextDoor, RailJointDrag
 from tests.tools.diagnose.campaigns import plan
+from tests.tools.diagnose.unlisted import NextDoor, RailJointDrag
 
 pytestmark = pytest.mark.long
 

@@ -58,7 +58,7 @@ class Verdict:
         (1.0, 0.4, 0.1),
         "odds",
         "of an effect there against one resembled, for each of `fit.place_sizes`",
-        "44 likeliest explanations: 2 of 26 right ones needed any, 8 of 18 wrong ones did",
+        "35 names of likeliest explanations: 2 of 17 right ones needed any, 8 of 18 wrong ones did",
     )
     worse: float = tuned(
         0.25,

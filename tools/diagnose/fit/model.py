@@ -60,43 +60,30 @@ class Model:
 
     def discrepancy(self) -> tuple[Array, Array]:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
-        return self._amount(0, self._of_form)
+        return self._amount(("form", ""))
 
     def of_form(self, number: int) -> Array:
         """Weights (m,) of one discrepancy of form times its size, averaged over the sizes."""
         assert self.marginal is not None
         return self.marginal.moments(self.chosen, self.marginal.place_of(number))[0]
 
-    def profiles(self, name: str | None = None) -> tuple[Array, Array]:
+    def profiles(self, name: str = "") -> tuple[Array, Array]:
         """What effects, or one of them, amount to beyond our formula (N,) along what no law tells
         of: in the channels' units, and whitened.
         """
-        return self._amount(self._of_form, len(self.fitted.nuisance.parts) - 1, True, name)
+        return self._amount(("profile",), name)
 
-    @property
-    def _of_form(self) -> int:
-        """How many terms of form act."""
-        terms = self.marginal.terms if self.marginal else ()
-        sizes = _values(terms[: len(self.sizes)], self.sizes) if terms else []
-        return sum(size > 0.0 for size in sizes)
-
-    def _amount(
-        self, begin: int, end: int, profile: bool = False, name: str | None = None
-    ) -> tuple[Array, Array]:
-        """Of the acting terms begin … end − 1, beside what every fit has; profile, name: of some
-        only.
-        """
+    def _amount(self, kinds: Sequence[Kind], name: str = "") -> tuple[Array, Array]:
+        """Of the acting terms of some kinds, beside what every fit has; name: of one effect."""
         nuisance, slack = self.fitted.nuisance, self.fitted.slack
         ends = np.cumsum([term.columns.count for term, _ in nuisance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
-        for number in range(begin + 1, end + 1):
-            term, size = nuisance.parts[number]
-            if (profile and term.kind != "profile") or name not in (None, term.name):
-                continue
-            weights = slack[ends[number - 1] : ends[number]]
-            own = own + size * term.columns.times(weights)
-            whitened = whitened + size * term.whitened.times(weights)
+        for number, (term, size) in enumerate(nuisance.parts[1:], start=1):
+            if term.kind in kinds and name in ("", term.name):
+                weights = slack[ends[number - 1] : ends[number]]
+                own = own + size * term.columns.times(weights)
+                whitened = whitened + size * term.whitened.times(weights)
         return own, whitened
 
     def log_likelihoods(self, name: str, kind: Kind) -> Array | None:

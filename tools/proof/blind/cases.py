@@ -67,6 +67,13 @@ class BlindCase:
     def stated(self) -> knowledge.Knowledge:
         return knowledge.misstated(self.trial.known, self.noise_factor)
 
+    def alone(self) -> list[BlindCase]:
+        """Of two effects the same campaign with each of them alone."""
+        if len(self.effects) < 2:
+            return []
+        worlds_of_one = [self.trial.world.with_effects(effect) for effect in self.effects]
+        return [replace(self, trial=replace(self.trial, world=of)) for of in worlds_of_one]
+
     def answers(self) -> dict[str, Any]:
         """As JSON types."""
         world, before = self.trial.world, self.reference

@@ -105,12 +105,19 @@ def _order(level: str) -> tuple[int, str]:
 
 
 def _two(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """Whatever else is concealed; and where each effect alone is named, or alarms, in the same
+    campaign.
+    """
+    named = [row for row in rows if row.alone and all(o.first_right("table") for o in row.alone)]
+    alarmed = [row for row in rows if row.alone and all(one.alarmed for one in row.alone)]
     return {
         "one named": counted(
             any(row.name_right(name, "table") for name in row.accepted) for row in rows
         ),
         "both named": counted(row.both_named() for row in rows),
         "both named by group": counted(row.both_named("table") for row in rows),
+        "both named where each alone is": counted(row.both_named("table") for row in named),
+        "both named where each alone alarms": counted(row.both_named("table") for row in alarmed),
         "a wrong one accepted": counted(
             any(not row.name_right(name, "table") for name in row.accepted) for row in rows
         ),

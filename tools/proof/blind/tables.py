@@ -107,6 +107,8 @@ def _named(score: Mapping[str, Any]) -> Table:
         ("two effects: one named", share_text(two["one named"])),
         ("  both named", share_text(two["both named"])),
         ("  both named, by the fixed groups", share_text(two["both named by group"])),
+        ("  … where each alone is named", share_text(two["both named where each alone is"])),
+        ("  … where each alone alarms", share_text(two["both named where each alone alarms"])),
         ("effect outside the list: called unlisted", share_text(unlisted["recall"])),
         ("  given a listed name above 0.5", share_text(unlisted["listed name above one half"])),
     ]

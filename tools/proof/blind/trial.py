@@ -25,6 +25,7 @@ ROOT = Path(gritd.__file__).parents[1]  # of the checkout, or site-packages
 DIAGNOSE = (sys.executable, "-m", "gritd", "diagnose")
 PATIENCE = 1200.0  # [s] after which a diagnosis is given up and counts as failed
 GIVEN, RESULT, OUTCOME = "given", "result.json", "outcome.json"
+ALONE = "alone-"  # folder of the same campaign with one of several effects, by its number
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,13 @@ class WorkerSpec:
     @property
     def folder(self) -> Path:
         return Path(self.output) / "cases" / self.name
+
+    @property
+    def alone(self) -> list[Path]:
+        """Folders of the same campaign with each of two effects alone."""
+        effects = self.assignment.effects
+        many = len(effects) if len(effects) > 1 else 0
+        return [self.folder / f"{ALONE}{number + 1}" for number in range(many)]
 
     @property
     def answers(self) -> Path:
@@ -70,6 +78,8 @@ def prepare(spec: WorkerSpec) -> str:
     case = cases.drawn(spec.number, spec.seed, spec.assignment)
     campaigns = handover.driven(case)
     handover.write(case, campaigns, spec.folder / GIVEN)
+    for one, folder in zip(case.alone(), spec.alone, strict=True):
+        handover.write(one, handover.driven(one), folder / GIVEN)
 
     sealed = seal.close(spec.answers, case.answers(), _truth(spec, campaigns[-1]))
     spec.seal.write_text(sealed + "\n", encoding="utf-8")
@@ -89,34 +99,34 @@ def _truth(spec: WorkerSpec, judged: handover.DrivenCampaign) -> dict[str, str]:
 
 def diagnose(spec: WorkerSpec) -> dict[str, Any]:
     """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed
-    over.
+    over; of two effects, each alone first.
     """
-    given = spec.folder / GIVEN
+    for folder in spec.alone:
+        _run(_command(spec, folder), folder / GIVEN)
     began = time.monotonic()
-    code, stderr = _run(_command(spec), given)
+    code, stderr = _run(_command(spec, spec.folder), spec.folder / GIVEN)
     outcome = {"code": code, "seconds": time.monotonic() - began, "said": stderr[-2000:]}
     (spec.folder / OUTCOME).write_text(json.dumps(outcome, indent=1), encoding="utf-8")
 
     if not spec.keep:
-        for path in given.rglob("*.mcap"):
+        for path in spec.folder.rglob("*.mcap"):
             path.unlink()
     return outcome
 
 
-def _command(spec: WorkerSpec) -> list[str]:
+def _command(spec: WorkerSpec, folder: Path) -> list[str]:
     """What an engineer would type in the folder of what was handed over."""
-    result = str((spec.folder / RESULT).resolve())
+    given, result = folder / GIVEN, str((folder / RESULT).resolve())
     options = ["--config", handover.CONFIGURATION, "--json", result]
     options += ["--jobs", "1"]  # cases run side by side
     if not spec.assignment.pair:
-        return [*spec.diagnose, *_recordings(spec, ""), *options]
+        return [*spec.diagnose, *_recordings(given), *options]
     options += ["--bed", spec.assignment.bed]
-    before = ["--reference", *_recordings(spec, handover.REFERENCE)]
-    return [*spec.diagnose, *_recordings(spec, handover.NEW), *before, *options]
+    before = ["--reference", *_recordings(given, handover.REFERENCE)]
+    return [*spec.diagnose, *_recordings(given, handover.NEW), *before, *options]
 
 
-def _recordings(spec: WorkerSpec, folder: str) -> list[str]:
-    given = spec.folder / GIVEN
+def _recordings(given: Path, folder: str = "") -> list[str]:
     return sorted(str(path.relative_to(given)) for path in (given / folder).glob("*.mcap"))
 
 

@@ -17,7 +17,7 @@ from gritd.tools.proof.blind import heldout, seal
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD
 from gritd.tools.proof.blind.strata import LEVELS
-from gritd.tools.proof.blind.trial import OUTCOME, RESULT, WorkerSpec
+from gritd.tools.proof.blind.trial import ALONE, OUTCOME, RESULT, WorkerSpec
 
 NOTHING, UNLISTED, INSUFFICIENT, FAILED = "(nothing)", "(unlisted)", "(insufficient)", "(failed)"
 DETECTABLE = 0.9 * LEVELS["weak"]  # times the detection limit
@@ -64,6 +64,7 @@ class CaseRow:
         str, float
     ]  # channel: variance that an oracle adds which must fit all but the form of the effect
     reference_verdict: str = ""  # what is said of the reference campaign itself
+    alone: tuple[CaseRow, ...] = ()  # of two effects: what is said of each alone, in this campaign
 
     @property
     def pair(self) -> bool:
@@ -152,6 +153,29 @@ def row(spec: WorkerSpec) -> CaseRow:
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
     result, trouble = _result(spec.folder / RESULT, outcome)
 
+    of_both = _row(spec, answers, outcome, result, trouble)
+    return replace(of_both, alone=tuple(_alone(of_both, folder) for folder in spec.alone))
+
+
+def _alone(of_both: CaseRow, folder: Path) -> CaseRow:
+    """What was said of one of two effects alone, by the number that its folder ends with."""
+    result, trouble = _result(folder / RESULT, {"said": "no result"})
+    return replace(
+        of_both,
+        truth=(of_both.truth[int(folder.name.removeprefix(ALONE)) - 1],),
+        verdict=str(result.get("verdict", "failed")),
+        hypotheses=_hypotheses(result),
+        note=trouble or str(result.get("summary", "")),
+    )
+
+
+def _row(
+    spec: WorkerSpec,
+    answers: Mapping[str, Any],
+    outcome: Mapping[str, Any],
+    result: Mapping[str, Any],
+    trouble: str,
+) -> CaseRow:
     return CaseRow(
         number=spec.number,
         stratum=answers["stratum"],

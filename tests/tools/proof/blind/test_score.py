@@ -181,6 +181,26 @@ def test_both_of_two_are_named_by_name_or_by_group() -> None:
     assert counts(found["one named"]) == (4, 4)
 
 
+def test_both_of_two_are_asked_for_where_each_alone_is_seen_in_the_same_campaign() -> None:
+    both = replace(
+        single("bed_slope", said("bed_slope"), said("grousers")),
+        stratum="two",
+        truth=("bed_slope", "grousers"),
+    )
+    first, second = single("bed_slope", said("bed_slope")), single("grousers", said("grousers"))
+    rows = [
+        replace(both, alone=(first, second)),
+        replace(both, alone=(first, second), hypotheses=(said("bed_slope"),)),
+        replace(both, alone=(first, single("grousers", verdict="unlisted"))),
+        replace(both, alone=(first, single("grousers", verdict="consistent"))),
+        both,
+    ]
+    found = score.score(rows)["two"]
+    assert counts(found["both named where each alone is"]) == (1, 2)
+    assert counts(found["both named where each alone alarms"]) == (2, 3)
+    assert counts(found["both named by group"]) == (4, 5)
+
+
 def test_sure_names_count_whether_first_or_not() -> None:
     rows = [
         single("bed_slope", said("bed_slope", 0.96), said("grousers", 0.91)),

@@ -12,8 +12,9 @@ taken the effect's part: so smaller ones count too, at what they cost.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 
 import numpy as np
 
@@ -97,6 +98,55 @@ def pass_beside(problem: Problem, model: Model, first: Pass) -> Pass:
         effect = problem.stack.rig.effects[name]
         effects[name] = _in_order(_of_signatures(problem, gram, effect, kept, kept[0].prior))
     return Pass(gram.total, effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Two effects beside a fit, each of its likeliest shape: their log evidence, summed over the
+    sizes of the discrepancy [nats], and where the fit of each begins.
+    """
+
+    evidence: float
+    each: tuple[Weighed, Weighed]
+
+
+def pairs_beside(problem: Problem, model: Model, first: Pass, most: int) -> list[Together]:
+    """Of all pairs of effects those that are likeliest beside a model, from one matrix of products:
+    of two misfits each may hide the other where one is tried alone.
+    """
+    every = [shapes[0] for shapes in first.effects.values()]
+    ends = np.cumsum([len(one.signature.sign) for one in every])
+    own = [np.arange(end - len(o.signature.sign), end) for end, o in zip(ends, every, strict=True)]
+    gram = Gram(problem, model)
+    a, b = gram.project(
+        whiten(problem.noise, np.column_stack([o.signature.columns for o in every]))
+    )
+
+    def sizes(i: int, j: int) -> tuple[Array, Array, Array]:
+        """Log evidence (s,) of two, A (s, p, p) and b (s, p)."""
+        index = np.concatenate((own[i], own[j]))
+        left, right = a[:, index[:, None], index], b[:, index]
+        sign = (*every[i].signature.sign, *every[j].signature.sign)
+        return gram.evidence + log_evidence(left, right, sign), left, right
+
+    def together(i: int, j: int) -> Together:
+        each_size, left, right = sizes(i, j)
+        best = int(np.argmax(each_size))
+        amplitude = np.split(_amplitude(left[best], right[best]), [len(own[i])])
+        begun = [
+            replace(
+                every[k],
+                start=_start(
+                    problem.stack.rig.effects[str(every[k].signature.of)], every[k].signature, x
+                ),
+                sizes=gram.sizes[best].chosen,
+            )
+            for k, x in zip((i, j), amplitude, strict=True)
+        ]
+        return Together(float(log_sum(each_size)), (begun[0], begun[1]))
+
+    likely = sorted(combinations(range(len(every)), 2), key=lambda p: -log_sum(sizes(*p)[0]))
+    return [together(*pair) for pair in likely[:most]]
 
 
 def varied_pass(problem: Problem, model: Model, first: Pass, jobs: int = 1) -> Pass:

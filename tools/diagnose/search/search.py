@@ -23,7 +23,13 @@ from gritd.tools.diagnose.fit.model import Model, does, fit_model, in_one_place
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.screen.evidence import Pass, Weighed, pass_beside, varied_pass
+from gritd.tools.diagnose.screen.evidence import (
+    Pass,
+    Weighed,
+    pairs_beside,
+    pass_beside,
+    varied_pass,
+)
 from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
 from gritd.tools.diagnose.tuning import TUNING
@@ -110,7 +116,9 @@ def search_models(
         if begun:
             names = ", or ".join(" and ".join(m.names) for m in begun)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
-            search = extended(search, begun, most, jobs, tell)
+            search = extended(
+                search, begun, most, jobs, tell, _together(search) if size == 1 else ()
+            )
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
@@ -171,11 +179,13 @@ def extended(
     most: int,
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
+    also: Sequence[Predicted] = (),
 ) -> EffectSearch:
     """With fits of some models and one more effect, the likeliest by linear algebra; no two of the
     same effects.
 
-    tell: is given how many of how many fits are done; of none before their number is known.
+    tell: is given how many of how many fits are done; of none before their number is known. also:
+    what is fitted beside these.
     """
     tell(0, 0)
     every = [p for model in starts for p in _gains(search, model, jobs)]
@@ -183,6 +193,8 @@ def extended(
     for predicted in sorted(every, key=lambda p: -p.evidence):
         if len(wanted) < most and not search.has(predicted.names):
             wanted.setdefault(predicted.names, predicted)
+    for predicted in also:
+        wanted.setdefault(predicted.names, predicted)
 
     def fitted(predicted: Predicted) -> Model | None:
         return attempted(lambda: _acting(search, _with_effect(search, predicted)))
@@ -223,6 +235,25 @@ def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
         Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
         for n in likely
     ]
+
+
+def _together(search: EffectSearch) -> list[Predicted]:
+    """The likeliest pairs of effects beside the bare model, where one of them was fitted alone: the
+    likelier one, beside which the other begins.
+    """
+    bare, first = search.bare, search.first.effects
+    if len(first.effects) < 2 or not search.first.on_grid:
+        return []
+    alone = {model.names[0]: model for model in search.sized(1)}
+    out = []
+    for pair in pairs_beside(search.problem, bare, first, TUNING.search.together):
+        fitted = [alone[name] for one in pair.each if (name := str(one.signature.of)) in alone]
+        if fitted:
+            model = max(fitted, key=lambda m: m.evidence)
+            other = next(one for one in pair.each if one.signature.of not in model.names)
+            sizes = (*other.sizes, *(0 for _ in model.chosen[len(bare.chosen) :]))
+            out.append(Predicted(model, pair.evidence, (replace(other, sizes=sizes),)))
+    return out
 
 
 def _starts(search: EffectSearch, model: Model, beside: Pass, name: str) -> tuple[Weighed, ...]:

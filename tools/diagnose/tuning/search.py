@@ -19,6 +19,9 @@ class SearchTuning:
         "of one effect, of two, beside which one more is looked for, and with it are fitted",
         "run time",
     )
+    together: int = tuned(
+        3, "pairs", "of effects that are likeliest together by linear algebra, fitted", "run time"
+    )
     again: int = tuned(
         4, "shapes", "of one effect or family tried again, or as starts: the likeliest", "run time"
     )

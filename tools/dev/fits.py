@@ -47,7 +47,8 @@ from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import EffectSearch, search_models
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import search_models
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.blind.handover import NEW, REFERENCE
 from gritd.tools.proof.ours.cases import draw, record, scaled

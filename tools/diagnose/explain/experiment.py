@@ -21,7 +21,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Foreseen, Rig
-from gritd.tools.diagnose.search.search import EffectSearch
+from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
 from gritd.tools.diagnose.verdict.decide import shown

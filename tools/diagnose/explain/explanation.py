@@ -36,7 +36,8 @@ from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out,
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
-from gritd.tools.diagnose.search.search import EffectSearch, without
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import QUIET, Decision
 

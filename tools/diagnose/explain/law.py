@@ -23,7 +23,7 @@ from gritd.tools.diagnose.fit.selection import parts_of, take_up
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.rig.interface import LawForm
 from gritd.tools.diagnose.rig.stack import Stack
-from gritd.tools.diagnose.search.search import EffectSearch
+from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decide import taken_share
 

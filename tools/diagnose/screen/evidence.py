@@ -102,8 +102,10 @@ def pass_beside(problem: Problem, model: Model, first: Pass) -> Pass:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Two effects beside a fit, each of its likeliest shape: their log evidence, summed over the
-    sizes of the discrepancy [nats], and where the fit of each begins.
+    """Two effects beside a fit, each of its likeliest shape.
+
+    evidence: log evidence summed over the sizes of the discrepancy [nats]; each: where it begins
+    beside the other.
     """
 
     evidence: float
@@ -112,41 +114,38 @@ class Together:
 
 def pairs_beside(problem: Problem, model: Model, first: Pass, most: int) -> list[Together]:
     """Of all pairs of effects those that are likeliest beside a model, from one matrix of products:
-    of two misfits each may hide the other where one is tried alone.
+    of two effects each may hide the other.
     """
     every = [shapes[0] for shapes in first.effects.values()]
-    ends = np.cumsum([len(one.signature.sign) for one in every])
-    own = [np.arange(end - len(o.signature.sign), end) for end, o in zip(ends, every, strict=True)]
+    columns = np.column_stack([one.signature.columns for one in every])
+    counts = [len(one.signature.sign) for one in every]
+    own = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
     gram = Gram(problem, model)
-    a, b = gram.project(
-        whiten(problem.noise, np.column_stack([o.signature.columns for o in every]))
-    )
+    a, b = gram.project(whiten(problem.noise, columns))
 
-    def sizes(i: int, j: int) -> tuple[Array, Array, Array]:
-        """Log evidence (s,) of two, A (s, p, p) and b (s, p)."""
-        index = np.concatenate((own[i], own[j]))
-        left, right = a[:, index[:, None], index], b[:, index]
+    def each_size(i: int, j: int) -> Array:
+        """Log evidence (s,) of two beside each size of the discrepancy."""
+        both = np.concatenate((own[i], own[j]))
         sign = (*every[i].signature.sign, *every[j].signature.sign)
-        return gram.evidence + log_evidence(left, right, sign), left, right
+        return gram.evidence + log_evidence(a[:, both[:, None], both], b[:, both], sign)
 
     def together(i: int, j: int) -> Together:
-        each_size, left, right = sizes(i, j)
-        best = int(np.argmax(each_size))
-        amplitude = np.split(_amplitude(left[best], right[best]), [len(own[i])])
-        begun = [
-            replace(
-                every[k],
-                start=_start(
-                    problem.stack.rig.effects[str(every[k].signature.of)], every[k].signature, x
-                ),
-                sizes=gram.sizes[best].chosen,
-            )
-            for k, x in zip((i, j), amplitude, strict=True)
-        ]
-        return Together(float(log_sum(each_size)), (begun[0], begun[1]))
+        evidence, both = each_size(i, j), np.concatenate((own[i], own[j]))
+        best = int(np.argmax(evidence))
+        amplitude = _amplitude(a[best][np.ix_(both, both)], b[best, both])
+        sizes, parts = gram.sizes[best].chosen, np.split(amplitude, [counts[i]])
+        begun = [_begun(problem, every[k], x, sizes) for k, x in zip((i, j), parts, strict=True)]
+        return Together(float(log_sum(evidence)), (begun[0], begun[1]))
 
-    likely = sorted(combinations(range(len(every)), 2), key=lambda p: -log_sum(sizes(*p)[0]))
+    pairs = combinations(range(len(every)), 2)
+    likely = sorted(pairs, key=lambda pair: -float(log_sum(each_size(*pair))))
     return [together(*pair) for pair in likely[:most]]
+
+
+def _begun(problem: Problem, one: Weighed, amplitude: Array, sizes: Chosen) -> Weighed:
+    """An effect at other strengths (p,), beside other sizes of the discrepancy."""
+    effect = problem.stack.rig.effects[str(one.signature.of)]
+    return replace(one, start=_start(effect, one.signature, amplitude), sizes=sizes)
 
 
 def varied_pass(problem: Problem, model: Model, first: Pass, jobs: int = 1) -> Pass:

@@ -2,14 +2,15 @@
 
 A pass (screen/evidence.py) tells by linear algebra which effects may explain the recordings. The
 likeliest are fitted. Beside the best two fits, and then beside the best pair, another pass tells
-what one more effect would gain. Each effect of the best model must stand: the model is fitted
-without each, from where it stands.
+what one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
+hide the other. Each effect of the best model must stand: the model is fitted without each, from
+where it stands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -19,79 +20,17 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
-from gritd.tools.diagnose.fit.model import Model, does, fit_model, in_one_place
-from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
+from gritd.tools.diagnose.fit.model import Model, does, fit_model
+from gritd.tools.diagnose.fit.problem import Free, Maker, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.screen.evidence import (
-    Pass,
-    Weighed,
-    pairs_beside,
-    pass_beside,
-    varied_pass,
-)
-from gritd.tools.diagnose.screen.screening import Screen, Screening, screen
-from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
+from gritd.tools.diagnose.screen.screening import Screening, screen
+from gritd.tools.diagnose.search.foretold import Predicted, gains, together
+from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT
 
-TURNING = "wheel_angle"  # what an effect that ripples goes with
 FURTHER = {1: "second", 2: "third"}  # effect, beside so many
-
-
-@dataclass(frozen=True)
-class EffectSearch:
-    """All models that were fitted, and the screen beside the bare model.
-
-    models: the base model first, exact in its form; then the bare model, with the discrepancy of
-        form that the recordings ask for; then those with effects.
-    failed: effects whose fit ended in a numerical failure.
-    """
-
-    screening: Screening
-    models: tuple[Model, ...]
-    first: Screen
-    failed: tuple[tuple[str, ...], ...] = ()
-
-    @property
-    def problem(self) -> Problem:
-        return self.screening.problem
-
-    @property
-    def base(self) -> Model:
-        """Exact in its form."""
-        return self.models[0]
-
-    @property
-    def bare(self) -> Model:
-        """Without effects, with the discrepancy of form that the recordings ask for."""
-        return self.models[1]
-
-    @property
-    def calibration(self) -> OddsCalibration:
-        """How far evidence is to be trusted here."""
-        return learnt(len(self.problem.stack.rig.effects))
-
-    def gain(self, model: Model) -> float:
-        """Log evidence above the bare model's [nats]."""
-        return float(model.evidence - self.bare.evidence)
-
-    def weight(self, model: Model) -> float:
-        """Log weight of a model against the bare one, by the prior of so many effects."""
-        evidence, count = np.array([self.gain(model)]), np.array([len(model.names)])
-        companions = np.array([in_one_place(self.problem.stack, model)])
-        return float(self.calibration.weights(evidence, count, np.zeros(1), companions)[0])
-
-    def sized(self, size: int) -> list[Model]:
-        """Models of so many effects, the likeliest first."""
-        return sorted((m for m in self.models if len(m.names) == size), key=lambda m: -m.evidence)
-
-    def best(self) -> Model:
-        """The likeliest model with effects, or the bare one."""
-        return max(self.models[1:], key=self.weight)
-
-    def has(self, names: Collection[str]) -> bool:
-        return any(set(m.names) == set(names) for m in self.models)
 
 
 def search_models(
@@ -117,7 +56,7 @@ def search_models(
             names = ", or ".join(" and ".join(m.names) for m in begun)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
             search = extended(
-                search, begun, most, jobs, tell, _together(search) if size == 1 else ()
+                search, begun, most, jobs, tell, together(search) if size == 1 else ()
             )
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
@@ -152,27 +91,6 @@ def _settled(search: EffectSearch) -> EffectSearch:
 # ---- one more effect ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Predicted:
-    """An effect beside a model: its log evidence by linear algebra, of the model with it [nats],
-    and where its fit begins.
-    """
-
-    model: Model
-    evidence: float
-    starts: tuple[Weighed, ...]
-
-    @property
-    def effect(self) -> str:
-        of = self.starts[0].signature.of
-        assert isinstance(of, str)
-        return of
-
-    @property
-    def names(self) -> frozenset[str]:
-        return frozenset((*self.model.names, self.effect))
-
-
 def extended(
     search: EffectSearch,
     starts: Sequence[Model],
@@ -188,7 +106,7 @@ def extended(
     what is fitted beside these.
     """
     tell(0, 0)
-    every = [p for model in starts for p in _gains(search, model, jobs)]
+    every = [p for model in starts for p in gains(search, model, jobs)]
     wanted: dict[frozenset[str], Predicted] = {}
     for predicted in sorted(every, key=lambda p: -p.evidence):
         if len(wanted) < most and not search.has(predicted.names):
@@ -213,75 +131,6 @@ def _acting(search: EffectSearch, model: Model) -> Model:
         return model
     idle = [name for name, size in does(model.fitted).items() if size < SLIGHT]
     return _acting(search, _changed(search, model, idle[0])) if idle else model
-
-
-def _gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
-    """Effects that gain enough beside a model: a share of the best, which a fit may turn round."""
-    first = search.first.effects
-    if model is search.bare:
-        beside = varied_pass(search.problem, model, first, jobs)
-    else:
-        beside = pass_beside(search.problem, model, first)
-
-    names = list(beside.effects)
-    if not search.first.on_grid:  # a ripple alone raised the alarm
-        effects = search.problem.stack.rig.effects
-        names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
-    top = max((beside.gain(name) for name in names), default=0.0)
-    alone = TUNING.search.little if model.names else 0.0
-    least = max(alone, TUNING.search.predicted_share * top - TUNING.search.predicted_less)
-    likely = [name for name in names if beside.gain(name) > least]
-    return [
-        Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
-        for n in likely
-    ]
-
-
-def _together(search: EffectSearch) -> list[Predicted]:
-    """The likeliest pairs of effects beside the bare model, where one of them was fitted alone: the
-    likelier one, beside which the other begins.
-    """
-    bare, first = search.bare, search.first.effects
-    if len(first.effects) < 2 or not search.first.on_grid:
-        return []
-    alone = {model.names[0]: model for model in search.sized(1)}
-    out = []
-    for pair in pairs_beside(search.problem, bare, first, TUNING.search.together):
-        fitted = [alone[name] for one in pair.each if (name := str(one.signature.of)) in alone]
-        if fitted:
-            model = max(fitted, key=lambda m: m.evidence)
-            other = next(one for one in pair.each if one.signature.of not in model.names)
-            sizes = (*other.sizes, *(0 for _ in model.chosen[len(bare.chosen) :]))
-            out.append(Predicted(model, pair.evidence, (replace(other, sizes=sizes),)))
-    return out
-
-
-def _starts(search: EffectSearch, model: Model, beside: Pass, name: str) -> tuple[Weighed, ...]:
-    """The likeliest shape of an effect; beside the bare model of one with edges along the bed also
-    others, elsewhere.
-    """
-    every = beside.effects[name]
-    edges = any(
-        p.scan and p.unit == "m" for p in search.problem.stack.rig.effects[name].parameters()
-    )
-    if model.names or not edges:
-        return tuple(every[:1])
-    apart = _apart(every)[: TUNING.search.again]
-    return tuple(one for one in apart if one.evidence > beside.alone) or tuple(every[:1])
-
-
-def _apart(ranked: Sequence[Weighed]) -> list[Weighed]:
-    """Of shapes that were tried, the likeliest first, those that are not beside a likelier one in
-    the grid.
-    """
-    tried = [one.signature.fixed for one in ranked]
-    grid = {name: sorted({fixed[name] for fixed in tried}) for name in tried[0]}
-    places = [np.array([grid[name].index(fixed[name]) for name in grid]) for fixed in tried]
-    return [
-        one
-        for number, one in enumerate(ranked)
-        if all(np.abs(places[number] - other).max() > 1 for other in places[:number])
-    ]
 
 
 def counting(step: Callable[[str], None], what: str) -> Callable[[int, int], None]:

@@ -31,7 +31,7 @@ from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import HAD, Rig
-from gritd.tools.diagnose.search.search import TURNING
+from gritd.tools.diagnose.search.foretold import TURNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 PASSING = {*BEYOND_FORM, TURNING}

@@ -23,7 +23,8 @@ from gritd.tools.diagnose.fit.model import Model, in_one_place
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration
-from gritd.tools.diagnose.search.search import EffectSearch, counting, shared, without
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import counting, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, WeighedExplanation

@@ -27,7 +27,7 @@ from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.search.calibration import OddsCalibration
-from gritd.tools.diagnose.search.search import TURNING
+from gritd.tools.diagnose.search.foretold import TURNING
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 

@@ -17,7 +17,8 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import EffectSearch, begin
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 

@@ -20,7 +20,8 @@ from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen import screening as module
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence, _without_first
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import EffectSearch, begin
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import Plan, record
 from tests.tools.diagnose.campaigns import plan

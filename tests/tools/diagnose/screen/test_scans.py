@@ -22,7 +22,8 @@ from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.scans import candidates, without_harmonics
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import EffectSearch, begin
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.coloured import coloured
 from tests.tools.diagnose.campaigns import plan

@@ -21,12 +21,11 @@ from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.evidence import Weighed, varied_pass
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search import search as searching
+from gritd.tools.diagnose.search.foretold import Predicted, gains, together
+from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.search.search import (
-    EffectSearch,
-    Predicted,
     _fitted_with,
     _free_near,
-    _gains,
     _retested,
     _with_effect,
     begin,
@@ -39,9 +38,9 @@ from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 pytestmark = pytest.mark.long
 
 
-def searched(acting: Effect | None, **given: Any) -> EffectSearch:
-    """Recordings in which an effect acts, or none, after the first pass."""
-    rig = wheel_rig(record(plan(**given), (acting,) if acting else ()), settings())
+def searched(*acting: Effect, **given: Any) -> EffectSearch:
+    """Recordings in which effects act, or none, after the first pass."""
+    rig = wheel_rig(record(plan(**given), acting), settings())
     return begin(prepare_screening(fit_base(rig)))
 
 
@@ -64,14 +63,34 @@ def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
         assert alone.fitted.x.tobytes() == beside.fitted.x.tobytes()
 
 
+def test_two_effects_that_hide_each_other_are_fitted_together() -> None:
+    """A friction that goes with the load and one that is larger backward: one of them alone gains
+    nothing, and others than these gain the most.
+    """
+    losses = (
+        make("load_dependent_friction", {"arm": 0.004}),
+        make("asymmetric_friction", {"difference": -0.1}),
+    )
+    search = searched(*losses)
+    gain = {name: search.first.effects.gain(name) for name in search.first.effects.effects}
+    assert gain["load_dependent_friction"] < 1.0
+    assert max(gain, key=lambda name: gain[name]) not in (one.name for one in losses)
+
+    alone = extended(search, [search.bare], TUNING.search.effects_first, 1)
+    first = together(alone)[0]
+    assert first.names == {one.name for one in losses}
+    two = _with_effect(alone, first)
+    assert two.evidence > alone.sized(1)[0].evidence + 20.0
+
+
 def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> None:
     """A friction may gain by chance what a ripple left over: it is not what stood out."""
-    quiet = searched(None)
+    quiet = searched()
     assert not quiet.first.on_grid
 
     rippling = replace(quiet, first=replace(quiet.first, ripple=1e-9))
     assert rippling.first.alarmed
-    tried = {predicted.effect for predicted in _gains(rippling, rippling.bare, 1)}
+    tried = {predicted.effect for predicted in gains(rippling, rippling.bare, 1)}
     assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}
 
 
@@ -79,7 +98,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     """Its rivals are fitted, and it is reported which one failed."""
     bare = Model(cast(Any, None))
     every = [offered(bare, name, [0.0]) for name in ("coulomb_friction", "bulldozing")]
-    monkeypatch.setattr(searching, "_gains", lambda *_: every)
+    monkeypatch.setattr(searching, "gains", lambda *_: every)
 
     def fitted(_: EffectSearch, predicted: Predicted) -> Model:
         if predicted.effect == "bulldozing":
@@ -179,7 +198,7 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
     varied = varied_pass(search.problem, search.bare, first)
     assert varied.gain("side_wall_rubbing") > first.gain("side_wall_rubbing") + 50.0
 
-    predicted = next(p for p in _gains(search, search.bare, 1) if p.effect == "side_wall_rubbing")
+    predicted = next(p for p in gains(search, search.bare, 1) if p.effect == "side_wall_rubbing")
     fitted = _with_effect(search, predicted)
     assert fitted.fitted.acting[0].share == pytest.approx(0.05, rel=0.25)  # type: ignore[attr-defined]
     assert fitted.evidence > search.bare.evidence + 50.0
@@ -188,7 +207,7 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
 def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     patch = make("soil_patch", {"friction_change": -0.2, "centre": 0.2, "length": 0.2})
     search = searched(patch)
-    predicted = next(p for p in _gains(search, search.bare, 1) if p.effect == "soil_patch")
+    predicted = next(p for p in gains(search, search.bare, 1) if p.effect == "soil_patch")
     assert 1 < len(predicted.starts) <= TUNING.search.again
     assert len({tuple(one.start) for one in predicted.starts}) == len(predicted.starts)
     best = _with_effect(search, predicted).evidence

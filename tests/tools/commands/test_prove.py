@@ -81,6 +81,25 @@ def test_a_pair_is_asked_for_with_its_reference(tmp_path: Path) -> None:
     assert counted["cases"] == 2
 
 
+def test_of_two_effects_each_is_tried_alone_in_the_same_campaign(tmp_path: Path) -> None:
+    arguments = ["--cases", "1", "--seed", "3", "--jobs", "1", "--output", str(tmp_path), "--keep"]
+    assert prove.main([*arguments, "--strata", "two"], STUB) == 0
+    (case,) = tmp_path.glob("cases/*")
+    both, first, second = (
+        json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        for folder in (case, case / "alone-1", case / "alone-2")
+    )
+    assert both["seen"] == first["seen"] == second["seen"]
+    recorded = {
+        (case / folder / "given" / "run-1.mcap").read_bytes()
+        for folder in ("", "alone-1", "alone-2")
+    }
+    assert len(recorded) == 3
+
+    counted = json.loads((tmp_path / "score.json").read_text(encoding="utf-8"))["two"]
+    assert counted["both named where each alone alarms"]["n"] == 1
+
+
 def test_seals_are_told_before_and_hold_after(finished: Path) -> None:
     seals = dict(
         line.split() for line in (finished / "seals.txt").read_text(encoding="utf-8").splitlines()

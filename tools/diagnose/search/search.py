@@ -1,8 +1,8 @@
 """From one pass to models: nonlinear fits of the likely effects, then of pairs and of triples.
 
 A pass (screen/evidence.py) tells by linear algebra which effects may explain the recordings. The
-likeliest are fitted. Beside the best two fits, and then beside the best pair, another pass tells
-what one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
+likeliest are fitted. Beside the best fit, and then beside the best pair, another pass tells what
+one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
 hide the other. Each effect of the best model must stand: the model is fitted without each, from
 where it stands.
 """
@@ -50,10 +50,10 @@ def search_models(
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
-    for size, (starts, most) in enumerate(TUNING.search.later, start=1):
-        begun = search.sized(size)[:starts]
+    for size, most in enumerate(TUNING.search.later, start=1):
+        begun = search.sized(size)[:1]
         if begun:
-            names = ", or ".join(" and ".join(m.names) for m in begun)
+            names = " and ".join(begun[0].names)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
             search = extended(
                 search, begun, most, jobs, tell, together(search) if size == 1 else ()

@@ -47,17 +47,15 @@ def search_models(
         return search
 
     tell = counting(step, "fitting the likely effects")
-    search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
+    search = extended(search, search.bare, TUNING.search.effects_first, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
     for size, most in enumerate(TUNING.search.later, start=1):
-        begun = search.sized(size)[:1]
-        if begun:
+        if begun := search.sized(size):
             names = " and ".join(begun[0].names)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
-            search = extended(
-                search, begun, most, jobs, tell, together(search) if size == 1 else ()
-            )
+            also = together(search) if size == 1 else []
+            search = extended(search, begun[0], most, jobs, tell, also)
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
@@ -93,33 +91,28 @@ def _settled(search: EffectSearch) -> EffectSearch:
 
 def extended(
     search: EffectSearch,
-    starts: Sequence[Model],
+    model: Model,
     most: int,
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
     also: Sequence[Predicted] = (),
 ) -> EffectSearch:
-    """With fits of some models and one more effect, the likeliest by linear algebra; no two of the
-    same effects.
+    """With fits of a model and one more effect, the likeliest by linear algebra.
 
     tell: is given how many of how many fits are done; of none before their number is known. also:
     what is fitted beside these.
     """
     tell(0, 0)
-    every = [p for model in starts for p in gains(search, model, jobs)]
-    wanted: dict[frozenset[str], Predicted] = {}
-    for predicted in sorted(every, key=lambda p: -p.evidence):
-        if len(wanted) < most and not search.has(predicted.names):
-            wanted.setdefault(predicted.names, predicted)
-    for predicted in also:
-        wanted.setdefault(predicted.names, predicted)
+    every = sorted(gains(search, model, jobs), key=lambda p: -p.evidence)
+    new = [predicted for predicted in every if not search.has(predicted.names)][:most]
+    wanted = {predicted.names: predicted for predicted in (*also, *new)}
 
     def fitted(predicted: Predicted) -> Model | None:
         return attempted(lambda: _acting(search, _with_effect(search, predicted)))
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
-    pairs = zip(wanted.values(), made, strict=True)
+    pairs = zip(fits, made, strict=True)
     failed = tuple((*p.model.names, p.effect) for p, model in pairs if model is None)
     models = (*search.models, *(model for model in made if model is not None))
     return replace(search, models=tuple(_the_better(models)), failed=(*search.failed, *failed))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.evidence import (
     Pass,
@@ -71,9 +72,9 @@ def together(search: EffectSearch) -> list[Predicted]:
     bare, first = search.bare, search.first.effects
     if len(first.effects) < 2 or not search.first.on_grid:
         return []
-    alone = {model.names[0]: model for model in search.sized(1)}
-    out = []
-    for pair in pairs_beside(search.problem, bare, first, TUNING.search.together):
+    most = TUNING.search.together
+    alone, out = {model.names[0]: model for model in search.sized(1)}, []
+    for pair in attempted(lambda: pairs_beside(search.problem, bare, first, most)) or []:
         fitted = [alone[name] for one in pair.each if (name := str(one.signature.of)) in alone]
         if fitted:
             model = max(fitted, key=lambda m: m.evidence)

@@ -99,9 +99,9 @@ def judged(
     calibration: OddsCalibration,
 ) -> Decision:
     """The decision from the evidence of all explanations. A name is accepted where it is likelier
-    to be there than to be resembled, and likelier than that nothing of the list is there. Where
-    runs that were held out are predicted worse with what would be accepted, it is less likely, but
-    for zeros that are set anew before each run.
+    to be there than to be resembled, and likelier than that nothing of the list is there, or
+    nothing beside the others. Where runs that were held out are predicted worse with what would be
+    accepted, it is less likely, but for zeros that are set anew before each run.
     """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
@@ -153,13 +153,19 @@ def _trusted(of: WeighedExplanation) -> bool:
 
 def _accepted(weighed: Sequence[WeighedExplanation], best: WeighedExplanation) -> list[str]:
     """Names of the best explanation that are accepted, by how far they are to be trusted in it and
-    in all explanations by the same effects.
+    in all explanations by the same effects: of several each must be likelier than the others alone.
     """
     own = next(w for w in weighed if w.model is best.model and not w.nameless)
     trust = _trust(weighed, best)
     probability, unlisted = _probabilities(weighed), _unlisted(weighed)
-    least = {name: min(trust[name], own.trusts[name]) for name in best.names}
-    return [n for n in best.names if likely(least[n]) and probability[n] > unlisted]
+
+    def stated(name: str) -> bool:
+        others = set(best.names) - {name}
+        alone = sum(w.probability for w in weighed if set(w.names) <= others)
+        trusted = likely(min(trust[name], own.trusts[name]))
+        return trusted and probability[name] > max(unlisted, alone)
+
+    return [name for name in best.names if stated(name)]
 
 
 def _doubted(of: WeighedExplanation, names: Sequence[str]) -> WeighedExplanation:

@@ -173,6 +173,31 @@ def test_no_name_is_stated_that_is_less_likely_than_none(names_alone: None) -> N
     assert found.verdict == "unlisted"
 
 
+@pytest.mark.parametrize(("more", "said"), [(-0.5, ("a",)), (0.5, ("a", "b"))])
+def test_a_further_name_is_stated_where_it_is_likelier_than_none_beside_the_first(
+    names_alone: None, monkeypatch: pytest.MonkeyPatch, more: float, said: tuple[str, ...]
+) -> None:
+    """Three rivals for the second place together are likelier than the first alone, with each
+    of them e^more as likely as that.
+    """
+
+    def left(_: Any, model: Fit, name: str) -> Fit:
+        return Fit(tuple(n for n in model.names if n != name))
+
+    monkeypatch.setattr(decide, "without", left)
+    monkeypatch.setattr(decide, "taken_share", lambda *_: 0.9)
+    by, one, whole = learnt(30), Fit(("a",)), (1.0, 1.0)
+    asked = by.temperature * (np.log(30) - by.more)
+    weighed: Any = [decide.WeighedExplanation(one, ("a",), 0, 30.0, 0.0, 0.9, (1.0,))]
+    for rival in "bcd":
+        fit, gain = Fit(("a", rival)), asked + by.temperature * (more if rival == "b" else -0.5)
+        two: Any = fit
+        weighed.append(decide.WeighedExplanation(two, fit.names, 0, 30.0 + gain, 0.0, 0.9, whole))
+    found = decide.judged(_searched(Fit((), 0)), weighed, {}, by)
+    assert found.probability["b"] > found.unlisted
+    assert found.best.names == said
+
+
 def test_of_equals_the_simplest_comes_first(names_alone: None) -> None:
     """Coulomb before Stribeck, unless Stribeck is clearly likelier."""
     bare, plain, richer = Fit((), 0), Fit(("plain",)), Fit(("richer",), 2)

@@ -114,7 +114,8 @@ class Together:
 
 def pairs_beside(problem: Problem, model: Model, first: Pass, most: int) -> list[Together]:
     """Of all pairs of effects those that are likeliest beside a model, from one matrix of products:
-    of two effects each may hide the other.
+    of two effects each may hide the other. Where one promises little beside the other it is no
+    pair.
     """
     every = [shapes[0] for shapes in first.effects.values()]
     columns = np.column_stack([one.signature.columns for one in every])
@@ -123,11 +124,11 @@ def pairs_beside(problem: Problem, model: Model, first: Pass, most: int) -> list
     gram = Gram(problem, model)
     a, b = gram.project(whiten(problem.noise, columns))
 
-    def each_size(i: int, j: int) -> Array:
-        """Log evidence (s,) of two beside each size of the discrepancy."""
-        both = np.concatenate((own[i], own[j]))
-        sign = (*every[i].signature.sign, *every[j].signature.sign)
-        return gram.evidence + log_evidence(a[:, both[:, None], both], b[:, both], sign)
+    def each_size(*some: int) -> Array:
+        """Log evidence (s,) of some of them beside each size of the discrepancy."""
+        index = np.concatenate([own[k] for k in some])
+        sign = [side for k in some for side in every[k].signature.sign]
+        return gram.evidence + log_evidence(a[:, index[:, None], index], b[:, index], sign)
 
     def together(i: int, j: int) -> Together:
         evidence, both = each_size(i, j), np.concatenate((own[i], own[j]))
@@ -137,9 +138,11 @@ def pairs_beside(problem: Problem, model: Model, first: Pass, most: int) -> list
         begun = [_begun(problem, every[k], x, sizes) for k, x in zip((i, j), parts, strict=True)]
         return Together(float(log_sum(evidence)), (begun[0], begun[1]))
 
-    pairs = combinations(range(len(every)), 2)
-    likely = sorted(pairs, key=lambda pair: -float(log_sum(each_size(*pair))))
-    return [together(*pair) for pair in likely[:most]]
+    alone = [float(log_sum(each_size(k))) for k in range(len(every))]
+    pairs = {p: float(log_sum(each_size(*p))) for p in combinations(range(len(every)), 2)}
+    likely = sorted(pairs, key=lambda pair: -pairs[pair])[:most]
+    little = TUNING.search.little
+    return [together(i, j) for i, j in likely if pairs[i, j] > max(alone[i], alone[j]) + little]
 
 
 def _begun(problem: Problem, one: Weighed, amplitude: Array, sizes: Chosen) -> Weighed:

@@ -1,8 +1,8 @@
 """From one pass to models: nonlinear fits of the likely effects, then of pairs and of triples.
 
 A pass (screen/evidence.py) tells by linear algebra which effects may explain the recordings. The
-likeliest are fitted. Beside the best fit, and then beside the best pair, another pass tells what
-one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
+likeliest are fitted. Beside the best two fits, and then beside the best pair, another pass tells
+what one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
 hide the other. Each effect of the best model must stand: the model is fitted without each, from
 where it stands.
 """
@@ -47,15 +47,15 @@ def search_models(
         return search
 
     tell = counting(step, "fitting the likely effects")
-    search = extended(search, search.bare, TUNING.search.effects_first, jobs, tell)
+    search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
     search = _settled(search)
     tested: Model | None = None
-    for size, most in enumerate(TUNING.search.later, start=1):
-        if begun := search.sized(size):
-            names = " and ".join(begun[0].names)
+    for size, (starts, most) in enumerate(TUNING.search.later, start=1):
+        if begun := search.sized(size)[:starts]:
+            names = ", or ".join(" and ".join(m.names) for m in begun)
             tell = counting(step, f"looking for a {FURTHER[size]} effect beside {names}")
             also = together(search) if size == 1 else []
-            search = extended(search, begun[0], most, jobs, tell, also)
+            search = extended(search, begun, most, jobs, tell, also)
         if (best := search.best()) is not tested:
             search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
@@ -91,21 +91,26 @@ def _settled(search: EffectSearch) -> EffectSearch:
 
 def extended(
     search: EffectSearch,
-    model: Model,
+    starts: Sequence[Model],
     most: int,
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
     also: Sequence[Predicted] = (),
 ) -> EffectSearch:
-    """With fits of a model and one more effect, the likeliest by linear algebra.
+    """With fits of some models and one more effect, the likeliest by linear algebra; no two of the
+    same effects.
 
     tell: is given how many of how many fits are done; of none before their number is known. also:
     what is fitted beside these.
     """
     tell(0, 0)
-    every = sorted(gains(search, model, jobs), key=lambda p: -p.evidence)
-    new = [predicted for predicted in every if not search.has(predicted.names)][:most]
-    wanted = {predicted.names: predicted for predicted in (*also, *new)}
+    every = [p for model in starts for p in gains(search, model, jobs)]
+    wanted: dict[frozenset[str], Predicted] = {}
+    for predicted in sorted(every, key=lambda p: -p.evidence):
+        if len(wanted) < most and not search.has(predicted.names):
+            wanted.setdefault(predicted.names, predicted)
+    for predicted in also:
+        wanted.setdefault(predicted.names, predicted)
 
     def fitted(predicted: Predicted) -> Model | None:
         return attempted(lambda: _acting(search, _with_effect(search, predicted)))

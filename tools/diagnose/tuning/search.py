@@ -13,8 +13,11 @@ class SearchTuning:
 
     effects_first: int = tuned(7, "effects", "fitted beside the base model", "run time")
     effects_quick: int = tuned(3, "effects", "fitted for a first answer", "run time")
-    later: tuple[int, ...] = tuned(
-        (4, 2), "effects", "fitted beside the best of one, beside the best two", "run time"
+    later: tuple[tuple[int, int], ...] = tuned(
+        ((2, 4), (1, 2)),
+        "models",
+        "of one effect, of two, beside which one more is looked for, and with it are fitted",
+        "run time",
     )
     together: int = tuned(
         3, "pairs", "of effects that are likeliest together by linear algebra, fitted", "run time"

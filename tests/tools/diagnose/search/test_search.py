@@ -54,7 +54,7 @@ def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
     """Also where another fit stood between."""
     search, found = searched(make("bulldozing", {"share": 0.75})), []
     for jobs in (1, 2):
-        found.append(extended(search, search.bare, 3, jobs).models[2:])
+        found.append(extended(search, [search.bare], 3, jobs).models[2:])
 
     assert len(found[0]) == 3
     assert [m.evidence for m in found[0]] == [m.evidence for m in found[1]]
@@ -76,7 +76,7 @@ def test_two_effects_that_hide_each_other_are_fitted_together() -> None:
     assert gain["load_dependent_friction"] < 1.0
     assert max(gain, key=lambda name: gain[name]) not in (one.name for one in losses)
 
-    alone = extended(search, search.bare, TUNING.search.effects_first, 1)
+    alone = extended(search, [search.bare], TUNING.search.effects_first, 1)
     first = together(alone)[0]
     assert first.names == {one.name for one in losses}
     two = _with_effect(alone, first)
@@ -111,7 +111,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     screening: Any = SimpleNamespace(problem=problem, forms=())
     search = EffectSearch(screening, (bare, bare), cast(Any, None))
 
-    found = extended(search, bare, 3, 1)
+    found = extended(search, [bare], 3, 1)
     assert [model.names for model in found.models[2:]] == [("coulomb_friction",)]
     assert found.failed == (("bulldozing",),)
 
@@ -135,7 +135,7 @@ def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:
 def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
     """A model of one effect whose fit got stuck is fitted again from the model of two."""
     search = searched(make("bulldozing", {"share": 0.75}))
-    alone = extended(search, search.bare, 1, 1)
+    alone = extended(search, [search.bare], 1, 1)
     (one,) = alone.models[2:]
     two = _with_effect(alone, offered(one, "viscous_friction", [0.1], one.chosen))
     stuck = replace(one, evidence=one.evidence - 200.0)

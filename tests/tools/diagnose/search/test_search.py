@@ -83,6 +83,11 @@ def test_two_effects_that_hide_each_other_are_fitted_together() -> None:
     assert two.evidence > alone.sized(1)[0].evidence + 20.0
 
 
+def test_beside_one_effect_no_pair_promises_anything() -> None:
+    search = searched(make("bulldozing", {"share": 0.75}))
+    assert together(extended(search, [search.bare], 1, 1)) == []
+
+
 def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> None:
     """A friction may gain by chance what a ripple left over: it is not what stood out."""
     quiet = searched()

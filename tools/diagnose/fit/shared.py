@@ -33,7 +33,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, joined, scale_of
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect, shown
 from gritd.tools.diagnose.fit.ripples import line_waves
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -173,39 +173,28 @@ def shared_terms(
     """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = {part: even(TUNING.fit.shared_sizes) for part in shared} | {STARTS: form_sizes()}
     terms = [
-        random_effect(_name(part), _reduced(columns, whiten(noise, columns)), noise, sizes[part])
+        random_effect(_name(part), shown(columns, whiten(noise, columns)), noise, sizes[part])
         for part, columns in shared.items()
     ]
     terms.append(random_effect("ripples in both", ripples, noise, Sizes()))
     return tuple(f for f in terms if f.columns.count)
 
 
-def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
+def lasting(
+    terms: Sequence[RandomEffect], sizes: Chosen
+) -> tuple[tuple[RandomEffect, ...], Chosen]:
     """The terms with what varies with time, heat, place or run, what runs begin with, and memory no
-    larger than in the reference. Where nothing dried, crept or lagged then, it is news now.
+    larger than in the reference; and their sizes. Where nothing dried, crept or lagged then, it is
+    news now.
     """
     passing = (_name(CHANGES), _name(STARTS), _name(MEMORY))
-    return tuple(
-        replace(f, sizes=f.sizes.up_to(number)) if f.name in passing else f
-        for f, number in zip(terms, sizes, strict=True)
-    )
+    pairs = [(f, n) for f, n in zip(terms, sizes, strict=True) if n or f.name not in passing]
+    kept = (replace(f, sizes=f.sizes.up_to(n)) if f.name in passing else f for f, n in pairs)
+    return tuple(kept), tuple(n for _, n in pairs)
 
 
 def _name(part: str) -> str:
     return f"{part} in both"
-
-
-def _reduced(columns: Array, whitened: Array) -> Array:
-    """Combinations of columns with the same covariance, the largest first; without those that
-    are less than the noise altogether.
-    """
-    if not columns.shape[1]:
-        return columns
-    values, vectors = np.linalg.eigh(whitened.T @ whitened)
-    large = np.flatnonzero(values > TUNING.numerics.shared_least)[::-1][
-        : TUNING.numerics.shared_most
-    ]
-    return np.asarray(columns @ vectors[:, large])
 
 
 def _level(stack: Stack, parts: Sequence[Index]) -> float:

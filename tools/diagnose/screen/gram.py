@@ -3,15 +3,11 @@ discrepancy.
 
 Around its fit a model is linear in its unknowns, each of a unit normal prior: constants and effect
 parameters in prior σ, tolerances, other forms of its effects, and the discrepancy of form δ times
-its sizes s. With the whitened columns F of all but δ, D of δ for sizes of 1, S of what is looked
-for, and the residual r, the normal equations with F eliminated are
+its sizes s. With the whitened columns F of all but δ, S of what is looked for, and the residual r,
+of whose products with one another fit/parted.py leaves G(s) where δ is eliminated:
 
-    L Lᵀ = I + FᵀF,   X = L⁻¹FᵀX for X = D, S, r,   G = [D S r]ᵀ[D S r] − [D S r]ᵀ[D S r] of these,
-
-formed once. For each of some sizes s of δ
-
-    M Mᵀ = I + s G_DD s,   y = M⁻¹ s G_Dr,   V = M⁻¹ s G_DS
-    e₀(s) = ln p(s) − ½(G_rr + strain² − yᵀy) − Σ ln diag L − Σ ln diag M
+    M Mᵀ = I + G_FF,   y = M⁻¹ G_Fr,   V = M⁻¹ G_FS
+    e₀(s) = ln p(s) − ½(G_rr + strain² − yᵀy) − Σ ln diag M − ½ ln det
     A(s) = G_SS − VᵀV,     b(s) = G_Sr − Vᵀy.
 
 (Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14.) A constant that stands at its bound keeps
@@ -21,38 +17,33 @@ its prior width.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.columns import Columns, joined, whole
 from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.parted import Parted, apart
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
-from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.interface import Bools
 
 
 @dataclass(frozen=True, eq=False)
 class Sized:
-    """One size of every discrepancy: which, its log evidence e₀ [nats]; of the columns of δ that
-    act (k,) their size, the root M (k, k) and y (k,).
+    """One size of every term: which, its log evidence e₀ [nats]; of the terms that act on values of
+    their own the sizes; factors (r,) of the columns F, the root M (r, r) and y (r,).
     """
 
     chosen: Chosen
     evidence: float
-    acting: Index
-    size: Array
+    apart: tuple[float, ...]
+    factor: Array
     root: Array
     y: Array
-
-    def solved(self, products: Array) -> Array:
-        """M⁻¹ s G (k, m) of products G (d, m) with all columns of δ."""
-        scaled = self.size[:, None] * products[self.acting]
-        return np.asarray(solve_triangular(self.root, scaled, lower=True, check_finite=False))
 
 
 class Gram:
@@ -61,25 +52,41 @@ class Gram:
     def __init__(self, problem: Problem, model: Model, rows: Bools | None = None) -> None:
         """rows: marks the values (N,) that count; if not given, all."""
         forms, chosen = _terms(model)
-        self._fixed = _fixed_columns(problem, model)
-        self._form = joined(problem.stack.size, [f.whitened for f in forms])
-        self._forms, self._residual = forms, model.fitted.residual
+        fitted, fixed = model.fitted, problem.fixed
+        self._own = fitted.own / fitted.penalty[: fitted.centre.size]
+        self._residual = fitted.residual
         if rows is not None:
-            self._fixed, self._form = self._fixed.of_rows(rows), self._form.of_rows(rows)
-            self._residual = self._residual * rows
+            self._own, self._residual = self._own * rows[:, None], self._residual * rows
+            forms, fixed = (tuple(_of_rows(f, rows) for f in each) for each in (forms, fixed))
 
-        self._root = _root(self._fixed)
-        strain = np.zeros(self._fixed.count)
-        known = model.fitted.centre.size
-        strain[:known] = model.fitted.centre * model.fitted.penalty[:known]
-        self._pulled = _solved(self._root, self._fixed.pulled(self._residual) - strain)
-        self._inside = _solved(self._root, self._fixed.products(self._form))
+        self._forms, self._apart = forms, apart(forms)
+        rest = [f for n, f in enumerate(forms) if n not in self._apart]
+        self._rest = (*fixed, *rest)
+        own = [forms[n] for n in self._apart]
+        self._parted = Parted(self._own, self._rest, self._residual, own)
 
-        gram = self._form.gram - self._inside.T @ self._inside
-        score = self._form.pulled(self._residual) - self._inside.T @ self._pulled
-        misfit = self._residual @ self._residual + strain @ strain - self._pulled @ self._pulled
-        alone = -0.5 * float(misfit) - float(np.log(np.diag(self._root)).sum())
-        self.sizes = [_sized(gram, score, alone, forms, some) for some in _about(chosen, forms)]
+        known = fitted.centre.size
+        self._strain = np.zeros(len(self._parted.square) - 1)
+        self._strain[:known] = fitted.centre * fitted.penalty[:known]
+        self.sizes = [self._sized(some) for some in _about(chosen, forms)]
+
+    def _sized(self, chosen: Chosen) -> Sized:
+        values = [f.sizes.values[n] for f, n in zip(self._forms, chosen, strict=True)]
+        own = tuple(values[n] for n in self._apart)
+        left, det = self._parted.left(own)
+        rest = [n for n in range(len(self._forms)) if n not in self._apart]
+        of_rest = [np.full(self._forms[n].columns.count, values[n]) for n in rest]
+        more = sum(len(each) for each in of_rest)
+        factor = np.concatenate((np.ones(len(self._strain) - more), *of_rest))
+
+        products = left[:-1, :-1] * factor[:, None] * factor
+        products[np.diag_indices_from(products)] += 1.0
+        root = np.asarray(cholesky(products, lower=True, overwrite_a=True, check_finite=False))
+        y = _solved(root, factor * left[:-1, -1] - self._strain)
+        misfit = left[-1, -1] + self._strain @ self._strain - y @ y
+        spread = float(np.log(np.diag(root)).sum()) + 0.5 * det
+        prior = sum(f.sizes.log_prior[n] for f, n in zip(self._forms, chosen, strict=True))
+        return Sized(chosen, float(prior - 0.5 * misfit - spread), own, factor, root, y)
 
     @property
     def evidence(self) -> Array:
@@ -109,15 +116,36 @@ class Gram:
 
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (s, m, m) and b (s, m) of whitened columns (N, m) for each of the sizes."""
-        inside = _solved(self._root, self._fixed.pulled(columns))
-        squares = columns.T @ columns - inside.T @ inside
-        scores = columns.T @ self._residual - inside.T @ self._pulled
-        shared = self._form.pulled(columns) - self._inside.T @ inside
+        pulled = [f.whitened.pulled(columns) for f in self._rest]
+        scores = self._residual @ columns
+        whole = np.vstack((self._own.T @ columns, *pulled, scores, columns.T @ columns))
+        taken = self._taken(columns)
 
-        turned = [one.solved(shared) for one in self.sizes]
-        a = np.stack([squares - v.T @ v for v in turned])
-        b = np.stack([scores - v.T @ one.y for v, one in zip(turned, self.sizes, strict=True)])
-        return a, b
+        a, b = [], []
+        for one in self.sizes:
+            pairs = enumerate(one.apart)
+            left = whole - sum(taken[number, size] for number, size in pairs if size > 0.0)
+            v = _solved(one.root, one.factor[:, None] * left[: len(one.y)])
+            a.append(left[len(one.y) + 1 :] - v.T @ v)
+            b.append(left[len(one.y)] - v.T @ one.y)
+        return np.stack(a), np.stack(b)
+
+    def _taken(self, columns: Array) -> dict[tuple[int, float], Array]:
+        """What each size of a term that acts on values of its own takes of the products of F, the
+        residual and columns (N, m) with these (r + 1 + m, m).
+        """
+        taken = {}
+        for number, part in enumerate(self._parted.parts):
+            turned = part.turned(columns)
+            beside = np.hstack((part.beside, turned)).T
+            for size in {one.apart[number] for one in self.sizes}:
+                taken[number, size] = beside @ (part.share(size)[:, None] * turned)
+        return taken
+
+
+def _of_rows(term: RandomEffect, rows: Bools) -> RandomEffect:
+    """As the marked values (N,) alone tell it."""
+    return replace(term, whitened=term.whitened.of_rows(rows))
 
 
 def _terms(model: Model) -> tuple[Sequence[RandomEffect], Chosen]:
@@ -125,32 +153,6 @@ def _terms(model: Model) -> tuple[Sequence[RandomEffect], Chosen]:
     fit.
     """
     return (model.marginal.terms, model.chosen) if model.marginal is not None else ((), ())
-
-
-def _fixed_columns(problem: Problem, model: Model) -> Columns:
-    """What has one size (N, q), each column one standard deviation."""
-    fitted = model.fitted
-    own = whole(fitted.own / fitted.penalty[: fitted.centre.size])
-    return joined(problem.stack.size, (own, *(f.whitened for f in problem.fixed)))
-
-
-def _sized(
-    gram: Array, score: Array, alone: float, forms: Sequence[RandomEffect], chosen: Chosen
-) -> Sized:
-    values = [f.sizes.values[n] for f, n in zip(forms, chosen, strict=True)]
-    widths = [f.columns.count for f in forms]
-    every = np.repeat(np.array(values), widths)
-    acting = np.flatnonzero(every)
-    size = every[acting]
-
-    products = gram[np.ix_(acting, acting)] * size[:, None] * size
-    products[np.diag_indices_from(products)] += 1.0
-    root = np.asarray(cholesky(products, lower=True, overwrite_a=True, check_finite=False))
-    y = _solved(root, size * score[acting])
-
-    prior = sum(float(f.sizes.log_prior[n]) for f, n in zip(forms, chosen, strict=True))
-    spread = float(np.log(np.diag(root)).sum())
-    return Sized(chosen, prior + alone + 0.5 * float(y @ y) - spread, acting, size, root, y)
 
 
 def _about(chosen: Chosen, forms: Sequence[RandomEffect]) -> list[Chosen]:
@@ -167,13 +169,6 @@ def _about(chosen: Chosen, forms: Sequence[RandomEffect]) -> list[Chosen]:
         for k in range(1 - most, most)
     ]
     return list(dict.fromkeys([chosen, *alone, *steps]))
-
-
-def _root(columns: Columns) -> Array:
-    """Cholesky root (q, q) of the products of columns (N, q) and their unit prior."""
-    gram = columns.gram
-    gram[np.diag_indices_from(gram)] += 1.0
-    return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 
 
 def _solved(root: Array, right: Array) -> Array:

@@ -81,6 +81,10 @@ class Objective(Protocol[Linearised, Tried]):
         coordinates have to follow.
         """
 
+    @property
+    def one_of_many(self) -> bool:
+        """Whether it is looked at among many others, and not where these begin."""
+
     def tried(self, centre: Array) -> tuple[Tried, float]:
         """The function at coordinates (n,), not linearised, and its objective [nats]."""
 
@@ -127,8 +131,8 @@ def descend(
 
         if better is None:
             return here, False
-        # a search looks at many curved valleys: there slopes that foretold the step will do
-        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
+        # a search looks at many valleys: there slopes that foretold the step will do
+        foretold = ground.one_of_many and abs(share - 1.0) < 1.0 - TUNING.numerics.good
         here, unsure = ground.moved(here, better), None if foretold else better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)

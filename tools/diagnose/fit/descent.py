@@ -106,13 +106,13 @@ def descend(
 
     unsure: where it stands, if its slopes are those of another place.
     """
-    here, damping, failed = start, TUNING.numerics.damping_start, False
+    here, damping, failed, foretold = start, TUNING.numerics.damping_start, False, False
 
     for _ in range(rounds):
         better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
             done = abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
-            if done and unsure is None:
+            if done and (unsure is None or foretold):
                 return here, True
             if unsure is not None and (done or failed):  # by these slopes
                 here, unsure, failed = ground.linearised(unsure), None, False
@@ -133,10 +133,10 @@ def descend(
             return here, False
         # a search looks at many valleys: there slopes that foretold the step will do
         foretold = ground.one_of_many and abs(share - 1.0) < 1.0 - TUNING.numerics.good
-        here, unsure = ground.moved(here, better), None if foretold else better
+        here, unsure = ground.moved(here, better), better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
-    if unsure is not None:
+    if unsure is not None and not foretold:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
 

@@ -26,7 +26,7 @@ from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
 from gritd.tools.diagnose.fit.parted import Parted, apart
 from gritd.tools.diagnose.fit.problem import Fitted, Free
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
-from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.tuning import TUNING
 
 Chosen = tuple[int, ...]  # of each term, which of its sizes
@@ -41,11 +41,11 @@ class Marginal:
         """fixed: what every fit has."""
         self.terms, known = tuple(terms), len(fitted.u) + len(fitted.x)
         self._fitted, self._fixed = fitted, tuple(fixed)
-        self._apart = apart(self.terms)
         allowed = sum(f.columns.count for f in fixed)
         self._ends = known + np.cumsum([0, allowed, *(f.columns.count for f in terms)])
 
-        beside = [self.place_of(n) for n in range(len(self.terms)) if n not in self._apart]
+        numbers = set(range(len(self.terms))) - set(apart(self.terms))
+        beside = [self.place_of(n) for n in sorted(numbers)]
         self._rest = np.concatenate((np.arange(known + allowed), *beside))
         centre, weight = np.concatenate((fitted.u, fitted.x)), fitted.penalty[:known]
         more = len(self._rest) - known
@@ -158,8 +158,9 @@ class Marginal:
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
-        matrix, scale, acting, _ = self._sized(chosen)
-        index = np.flatnonzero(acting & ~self._held)
+        matrix, factor, _ = self._parted.left(chosen)
+        scale = factor[:-1]
+        index = np.flatnonzero((scale > 0.0) & ~self._held)
         root, last = self._rooted(matrix, index)
         inside = solve_triangular(root, np.eye(len(index)), lower=True, check_finite=False)
 
@@ -172,8 +173,9 @@ class Marginal:
         held = dict(zip(self._rest.tolist(), (self._centre * scale).tolist(), strict=True))
         mean += [held.get(k, 0.0) for k in wanted.tolist()]
 
-        for number, part in zip(self._apart, self._parted.parts, strict=True):
-            size, first = self._values(chosen)[number], int(self._ends[1 + number])
+        sizes = self._parted.sizes(chosen)
+        for number, part in self._parted.apart.items():
+            size, first = sizes[number], int(self._ends[1 + number])
             those = np.flatnonzero((wanted >= first) & (wanted < self._ends[2 + number]))
             if size > 0.0 and those.size:
                 turned = part.vectors[wanted[those] - first] * part.share(size)
@@ -209,7 +211,8 @@ class Marginal:
         """Curvature (p, p) and slope (p,) of the strengths, all else eliminated, and the log
         evidence where these stand [nats]; by factors.
         """
-        matrix, _, acting, spread = self._sized(chosen)
+        matrix, factor, spread = self._parted.left(chosen)
+        acting = factor[:-1] > 0.0
         weak = np.flatnonzero(acting & ~self._held & ~self._strong)
         strong = np.flatnonzero(acting & ~self._held & self._strong)
         centre, prior = self._centre[weak], self._weight[weak] ** 2
@@ -239,27 +242,7 @@ class Marginal:
 
     @cached_property
     def _parted(self) -> Parted:
-        rest = [f for n, f in enumerate(self.terms) if n not in self._apart]
-        own = [self.terms[n] for n in self._apart]
-        fitted = self._fitted
-        return Parted(fitted.own, (*self._fixed, *rest), fitted.residual, own)
-
-    def _values(self, chosen: Chosen) -> list[float]:
-        """The sizes (t,)."""
-        return [f.sizes.values[n] for f, n in zip(self.terms, chosen, strict=True)]
-
-    def _sized(self, chosen: Chosen) -> tuple[Array, Array, Bools, float]:
-        """For given sizes: products (r + 1, r + 1) of all but the terms that act on values of their
-        own, the residual last; the factors (r,) in them; which of them act; ln det of what is
-        eliminated.
-        """
-        values, known = self._values(chosen), int(self._ends[1])
-        left, spread = self._parted.left([values[n] for n in self._apart])
-        rest = [n for n in range(len(self.terms)) if n not in self._apart]
-        more = [np.full(self.terms[n].columns.count, values[n]) for n in rest]
-        scale = np.concatenate((np.ones(known), *more))
-        factors = np.append(scale, 1.0)
-        return left * factors[:, None] * factors, scale, scale > 0.0, spread
+        return Parted(self._fitted.own, self._fixed, self.terms, self._fitted.residual)
 
 
 def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> Array:

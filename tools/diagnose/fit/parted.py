@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -58,50 +59,70 @@ class Apart:
         return np.asarray(self.vectors.T @ self.term.whitened.pulled(columns))
 
 
+class Left(NamedTuple):
+    """Of given sizes: what is left of the products (r + 1, r + 1), each column times its factor
+    (r + 1,), the residual last; and the ln det of what is eliminated.
+    """
+
+    products: Array
+    factor: Array
+    spread: float
+
+
 class Parted:
-    """Products of whitened columns R (N, r) and a residual. parts: the terms that act on values of
-    their own; square (r + 1, r + 1): of all else with one another, the residual last.
+    """Products of whitened columns R (N, r) and a residual. apart: the terms that act on values of
+    their own, by their numbers among all; rest: the terms in R, after its own columns.
     """
 
     def __init__(
         self,
         own: Array,
-        rest: Sequence[RandomEffect],
-        residual: Array,
+        fixed: Sequence[RandomEffect],
         terms: Sequence[RandomEffect],
+        residual: Array,
     ) -> None:
-        """own (N, k): the first of R; rest: its other columns; terms: that act on values of their
-        own. All whitened.
+        """own (N, k): whitened, the first of R; fixed: terms of one size, the next; terms: of any
+        size; residual (N,): whitened.
         """
+        numbers = apart(terms)
+        self.rest = (*fixed, *(f for n, f in enumerate(terms) if n not in numbers))
+        self._terms, self._once = tuple(terms), own.shape[1] + sum(f.columns.count for f in fixed)
+
         leading = np.column_stack((own, residual))
         square = leading.T @ leading
-        pulled = [f.whitened.pulled(leading) for f in rest]
+        pulled = [f.whitened.pulled(leading) for f in self.rest]
         beside = np.vstack([np.zeros((0, leading.shape[1])), *pulled])
-        self.square = np.block(
+        self._square = np.block(
             [
                 [square[:-1, :-1], beside[:, :-1].T, square[:-1, -1:]],
-                [beside[:, :-1], products(rest), beside[:, -1:]],
+                [beside[:, :-1], products(self.rest), beside[:, -1:]],
                 [square[-1:, :-1], beside[:, -1:].T, square[-1:, -1:]],
             ]
         )
-        self.parts = [_part(term, leading, rest) for term in terms]
+        self.apart = {n: _part(terms[n], leading, self.rest) for n in numbers}
         self._taken: dict[tuple[int, float], Array] = {}
 
-    def left(self, sizes: Sequence[float]) -> tuple[Array, float]:
-        """What is left of the products (r + 1, r + 1) for given sizes, and the ln det of what is
-        eliminated.
-        """
-        left, spread = self.square.copy(), 0.0
-        for number, (part, size) in enumerate(zip(self.parts, sizes, strict=True)):
-            if size > 0.0:
+    def sizes(self, chosen: Sequence[int]) -> list[float]:
+        """Of every term, by the number of its size."""
+        return [f.sizes.values[n] for f, n in zip(self._terms, chosen, strict=True)]
+
+    def left(self, chosen: Sequence[int]) -> Left:
+        """What is left of the products for given sizes."""
+        left, spread, sizes = self._square.copy(), 0.0, self.sizes(chosen)
+        of_rest = [np.ones(self._once)]
+        for number, (term, size) in enumerate(zip(self._terms, sizes, strict=True)):
+            if number not in self.apart:
+                of_rest.append(np.full(term.columns.count, size))
+            elif size > 0.0:
                 left -= self._of(number, size)
-                spread += float(np.log1p(size**2 * part.values).sum())
-        return left, spread
+                spread += float(np.log1p(size**2 * self.apart[number].values).sum())
+        factor = np.concatenate((*of_rest, [1.0]))
+        return Left(left * factor[:, None] * factor, factor, spread)
 
     def _of(self, number: int, size: float) -> Array:
         """What a term takes of the products (r + 1, r + 1)."""
         if (number, size) not in self._taken:
-            part = self.parts[number]
+            part = self.apart[number]
             root = np.sqrt(part.share(size))[:, None] * part.beside
             self._taken[number, size] = root.T @ root
         return self._taken[number, size]

@@ -26,7 +26,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.parted import Parted, apart
+from gritd.tools.diagnose.fit.parted import Parted
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.rig.interface import Bools
@@ -34,13 +34,12 @@ from gritd.tools.diagnose.rig.interface import Bools
 
 @dataclass(frozen=True, eq=False)
 class Sized:
-    """One size of every term: which, its log evidence e₀ [nats]; of the terms that act on values of
-    their own the sizes; factors (r,) of the columns F, the root M (r, r) and y (r,).
+    """One size of every term: which, its log evidence e₀ [nats]; factors (r,) of the columns F, the
+    root M (r, r) and y (r,).
     """
 
     chosen: Chosen
     evidence: float
-    apart: tuple[float, ...]
     factor: Array
     root: Array
     y: Array
@@ -59,34 +58,23 @@ class Gram:
             self._own, self._residual = self._own * rows[:, None], self._residual * rows
             forms, fixed = (tuple(_of_rows(f, rows) for f in each) for each in (forms, fixed))
 
-        self._forms, self._apart = forms, apart(forms)
-        rest = [f for n, f in enumerate(forms) if n not in self._apart]
-        self._rest = (*fixed, *rest)
-        own = [forms[n] for n in self._apart]
-        self._parted = Parted(self._own, self._rest, self._residual, own)
-
-        known = fitted.centre.size
-        self._strain = np.zeros(len(self._parted.square) - 1)
-        self._strain[:known] = fitted.centre * fitted.penalty[:known]
+        self._forms = forms
+        self._parted = Parted(self._own, fixed, forms, self._residual)
+        self._strain = fitted.centre * fitted.penalty[: fitted.centre.size]
         self.sizes = [self._sized(some) for some in _about(chosen, forms)]
 
     def _sized(self, chosen: Chosen) -> Sized:
-        values = [f.sizes.values[n] for f, n in zip(self._forms, chosen, strict=True)]
-        own = tuple(values[n] for n in self._apart)
-        left, det = self._parted.left(own)
-        rest = [n for n in range(len(self._forms)) if n not in self._apart]
-        of_rest = [np.full(self._forms[n].columns.count, values[n]) for n in rest]
-        more = sum(len(each) for each in of_rest)
-        factor = np.concatenate((np.ones(len(self._strain) - more), *of_rest))
-
-        products = left[:-1, :-1] * factor[:, None] * factor
+        left, factor, det = self._parted.left(chosen)
+        products, score = left[:-1, :-1], left[:-1, -1]
         products[np.diag_indices_from(products)] += 1.0
-        root = np.asarray(cholesky(products, lower=True, overwrite_a=True, check_finite=False))
-        y = _solved(root, factor * left[:-1, -1] - self._strain)
+        score[: self._strain.size] -= self._strain
+        root = np.asarray(cholesky(products, lower=True, check_finite=False))
+        y = _solved(root, score)
+
         misfit = left[-1, -1] + self._strain @ self._strain - y @ y
         spread = float(np.log(np.diag(root)).sum()) + 0.5 * det
         prior = sum(f.sizes.log_prior[n] for f, n in zip(self._forms, chosen, strict=True))
-        return Sized(chosen, float(prior - 0.5 * misfit - spread), own, factor, root, y)
+        return Sized(chosen, float(prior - 0.5 * misfit - spread), factor[:-1], root, y)
 
     @property
     def evidence(self) -> Array:
@@ -116,30 +104,30 @@ class Gram:
 
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (s, m, m) and b (s, m) of whitened columns (N, m) for each of the sizes."""
-        pulled = [f.whitened.pulled(columns) for f in self._rest]
+        pulled = [f.whitened.pulled(columns) for f in self._parted.rest]
         scores = self._residual @ columns
         whole = np.vstack((self._own.T @ columns, *pulled, scores, columns.T @ columns))
         taken = self._taken(columns)
 
         a, b = [], []
         for one in self.sizes:
-            pairs = enumerate(one.apart)
-            left = whole - sum(taken[number, size] for number, size in pairs if size > 0.0)
-            v = _solved(one.root, one.factor[:, None] * left[: len(one.y)])
-            a.append(left[len(one.y) + 1 :] - v.T @ v)
-            b.append(left[len(one.y)] - v.T @ one.y)
+            sizes, count = self._parted.sizes(one.chosen), len(one.y)
+            left = whole - sum(of_size[sizes[number]] for number, of_size in taken.items())
+            v = _solved(one.root, one.factor[:, None] * left[:count])
+            a.append(left[count + 1 :] - v.T @ v)
+            b.append(left[count] - v.T @ one.y)
         return np.stack(a), np.stack(b)
 
-    def _taken(self, columns: Array) -> dict[tuple[int, float], Array]:
-        """What each size of a term that acts on values of its own takes of the products of F, the
-        residual and columns (N, m) with these (r + 1 + m, m).
+    def _taken(self, columns: Array) -> dict[int, dict[float, Array]]:
+        """What a term that acts on values of its own takes of the products of F, the residual and
+        columns (N, m) with these (r + 1 + m, m), by its number and size.
         """
         taken = {}
-        for number, part in enumerate(self._parted.parts):
+        for number, part in self._parted.apart.items():
             turned = part.turned(columns)
             beside = np.hstack((part.beside, turned)).T
-            for size in {one.apart[number] for one in self.sizes}:
-                taken[number, size] = beside @ (part.share(size)[:, None] * turned)
+            sizes = {self._parted.sizes(one.chosen)[number] for one in self.sizes}
+            taken[number] = {s: beside @ (part.share(s)[:, None] * turned) for s in sizes}
         return taken
 
 

@@ -164,14 +164,11 @@ class Marginal:
         root, last = self._rooted(matrix, index)
         inside = solve_triangular(root, np.eye(len(index)), lower=True, check_finite=False)
 
-        place = np.full(self._ends[-1], -1)
-        place[self._rest[index]] = np.arange(len(index))
-        mean, linear = np.zeros(len(wanted)), np.zeros((len(wanted), len(index)))
-        shared = np.zeros((len(wanted), len(wanted)))
-        own = place[wanted] >= 0
-        linear[np.flatnonzero(own), place[wanted[own]]] = scale[index][place[wanted[own]]]
-        held = dict(zip(self._rest.tolist(), (self._centre * scale).tolist(), strict=True))
-        mean += [held.get(k, 0.0) for k in wanted.tolist()]
+        # mean and slope along what is left, of those in it
+        every = np.zeros(self._ends[-1])
+        every[self._rest] = self._centre * scale
+        mean, shared = every[wanted], np.zeros((len(wanted), len(wanted)))
+        linear = np.where(wanted[:, None] == self._rest[index], scale[index], 0.0)
 
         sizes = self._parted.sizes(chosen)
         for number, part in self._parted.apart.items():

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.fit.random_effect import RandomEffect
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, blocks_shown
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise
@@ -45,7 +45,7 @@ def fit_roughly(stack: Stack) -> BaseFit:
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
 
-    problem = Problem(stack, noise, allowed(stack))
+    problem = Problem(stack, noise, np.column_stack((allowed(stack), stack.doubts)))
     fitted = problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds)
     return BaseFit(problem, Model(fitted))
 
@@ -94,15 +94,16 @@ def sized_beside(
 
 
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:
-    """Without terms, what each run does for itself allowed."""
+    """Without terms, what each run does for itself allowed; of what the noise hides nothing."""
     stack = rough.problem.stack
-    return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack))))
+    known = blocks_shown(np.column_stack((noise.of_runs, allowed(stack))), noise)
+    return Problem(stack, noise, np.column_stack((known, stack.doubts)))
 
 
 def allowed(stack: Stack) -> Array:
     """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, the relief of the
-    bed, and what a learnt discrepancy of the configuration leaves open, last.
+    bed. What a learnt discrepancy of the configuration leaves open stands after them.
     """
     share = TUNING.fit.tolerance
     smooth = (tolerance(stack, share), share * of_differences(stack))
-    return np.column_stack((*smooth, stack.nuisances, stack.doubts))
+    return np.column_stack((*smooth, stack.nuisances))

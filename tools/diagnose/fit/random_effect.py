@@ -79,23 +79,22 @@ def random_effect(
 
 def blocks_shown(columns: Array, noise: Noise) -> Array:
     """Combinations of columns (N, m) in the channels' units, of those that act on the same values
-    each; without those that the noise hides.
+    each; without those that the noise hides altogether.
     """
-    own = columns_of(columns)
+    own, least = columns_of(columns), TUNING.numerics.least_allowed
     pairs = zip(own.blocks, whitened(noise, own).blocks, strict=True)
-    kept = [(rows, shown(block, white)) for (rows, block), (_, white) in pairs]
+    kept = [(rows, shown(block, white, least)) for (rows, block), (_, white) in pairs]
     return Columns(len(columns), tuple(kept)).dense
 
 
-def shown(columns: Array, whitened: Array) -> Array:
+def shown(columns: Array, whitened: Array, least: float) -> Array:
     """Combinations of columns with the same covariance, the largest first; without those that
-    are less than the noise altogether.
+    are less than a share of the noise altogether.
     """
     if not columns.shape[1]:
         return columns
     values, vectors = np.linalg.eigh(whitened.T @ whitened)
-    large = np.flatnonzero(values > TUNING.numerics.least_shown)[::-1]
-    return np.asarray(columns @ vectors[:, large[: TUNING.numerics.most_shown]])
+    return np.asarray(columns @ vectors[:, np.flatnonzero(values > least)[::-1]])
 
 
 def products(parts: Sequence[RandomEffect]) -> Array:

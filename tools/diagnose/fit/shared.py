@@ -172,10 +172,9 @@ def shared_terms(
 ) -> tuple[RandomEffect, ...]:
     """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = {part: even(TUNING.fit.shared_sizes) for part in shared} | {STARTS: form_sizes()}
-    terms = [
-        random_effect(_name(part), shown(columns, whiten(noise, columns)), noise, sizes[part])
-        for part, columns in shared.items()
-    ]
+    least, most = TUNING.numerics.shared_least, TUNING.numerics.shared_most
+    kept = {p: shown(c, whiten(noise, c), least)[:, :most] for p, c in shared.items()}
+    terms = [random_effect(_name(p), c, noise, sizes[p]) for p, c in kept.items()]
     terms.append(random_effect("ripples in both", ripples, noise, Sizes()))
     return tuple(f for f in terms if f.columns.count)
 

@@ -67,7 +67,7 @@ def explainable(rough: BaseFit) -> Explainable:
 
 def refit(rough: BaseFit, noise: Noise) -> BaseFit:
     """In the noise that was found, what each run does for itself allowed."""
-    problem = in_noise(rough, noise)
+    problem = for_search(rough, noise)
     fitted = problem.descend((), (), rough.fitted.u, np.zeros(0))
     return BaseFit(problem, plain_model(problem, fitted), form_terms(problem.stack, noise))
 
@@ -87,17 +87,23 @@ def sized_beside(
     start: BaseFit, noise: Noise, more: Sequence[RandomEffect], sizes: Chosen
 ) -> BaseFit:
     """The same with given sizes of all terms."""
-    problem = in_noise(start, noise)
+    problem = for_search(start, noise)
     forms = (*form_terms(problem.stack, noise), *more)
     begins = (start.fitted.u, np.zeros(0))
     return BaseFit(problem, sized_model(problem, forms, begins, sizes), forms)
 
 
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:
-    """Without terms, what each run does for itself allowed; of what the noise hides nothing."""
+    """Without terms, what each run does for itself allowed."""
     stack = rough.problem.stack
-    known = blocks_shown(np.column_stack((noise.of_runs, allowed(stack))), noise)
-    return Problem(stack, noise, np.column_stack((known, stack.doubts)))
+    return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack), stack.doubts)))
+
+
+def for_search(rough: BaseFit, noise: Noise) -> Problem:
+    """The same where no more noise is learnt: of what the noise hides nothing."""
+    stack = rough.problem.stack
+    shown = blocks_shown(np.column_stack((noise.of_runs, allowed(stack))), noise)
+    return Problem(stack, noise, np.column_stack((shown, stack.doubts)))
 
 
 def allowed(stack: Stack) -> Array:

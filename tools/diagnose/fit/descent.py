@@ -81,10 +81,6 @@ class Objective(Protocol[Linearised, Tried]):
         coordinates have to follow.
         """
 
-    @property
-    def one_of_many(self) -> bool:
-        """Whether it is looked at among many others, and not where these begin."""
-
     def tried(self, centre: Array) -> tuple[Tried, float]:
         """The function at coordinates (n,), not linearised, and its objective [nats]."""
 
@@ -106,13 +102,13 @@ def descend(
 
     unsure: where it stands, if its slopes are those of another place.
     """
-    here, damping, failed, foretold = start, TUNING.numerics.damping_start, False, False
+    here, damping, failed = start, TUNING.numerics.damping_start, False
 
     for _ in range(rounds):
         better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
             done = abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
-            if done and (unsure is None or foretold):
+            if done and unsure is None:
                 return here, True
             if unsure is not None and (done or failed):  # by these slopes
                 here, unsure, failed = ground.linearised(unsure), None, False
@@ -131,12 +127,12 @@ def descend(
 
         if better is None:
             return here, False
-        # a search looks at many valleys: there slopes that foretold the step will do
-        foretold = ground.one_of_many and abs(share - 1.0) < 1.0 - TUNING.numerics.good
-        here, unsure = ground.moved(here, better), better
+        # a search looks at many curved valleys: there slopes that foretold the step will do
+        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
+        here, unsure = ground.moved(here, better), None if foretold else better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
-    if unsure is not None and not foretold:
+    if unsure is not None:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
 

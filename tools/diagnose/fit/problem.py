@@ -230,7 +230,6 @@ class EffectsObjective:
         self.bounds = descent.CoordinateBounds(low, high)
         shapes = [f.parameter.role != "strength" for f in free]
         self.curved = np.array([False] * self._count + shapes)
-        self.one_of_many = bool(effects)
 
     def tried(self, centre: Array) -> tuple[Tried, float]:
         """See descent.Objective; constants, then effect parameters (n,)."""

@@ -49,10 +49,9 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
     noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(first, noise, shared, ripples)
-    more, sizes = shared_terms(noise, shared, ripples), usual.model.sizes
-    count = len(sizes) - len(more)
-    kept, of_kept = lasting(more, sizes[count:])
-    return sized_beside(usual, noise, kept, (*sizes[:count], *of_kept))
+    more = shared_terms(noise, shared, ripples)
+    sizes = usual.model.sizes
+    return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
 
 
 def _of_reference(

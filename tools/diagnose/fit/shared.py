@@ -179,17 +179,15 @@ def shared_terms(
     return tuple(f for f in terms if f.columns.count)
 
 
-def lasting(
-    terms: Sequence[RandomEffect], sizes: Chosen
-) -> tuple[tuple[RandomEffect, ...], Chosen]:
+def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect, ...]:
     """The terms with what varies with time, heat, place or run, what runs begin with, and memory no
-    larger than in the reference; and their sizes. Where nothing dried, crept or lagged then, it is
-    news now.
+    larger than in the reference. Where nothing dried, crept or lagged then, it is news now.
     """
     passing = (_name(CHANGES), _name(STARTS), _name(MEMORY))
-    pairs = [(f, n) for f, n in zip(terms, sizes, strict=True) if n or f.name not in passing]
-    kept = (replace(f, sizes=f.sizes.up_to(n)) if f.name in passing else f for f, n in pairs)
-    return tuple(kept), tuple(n for _, n in pairs)
+    return tuple(
+        replace(f, sizes=f.sizes.up_to(number)) if f.name in passing else f
+        for f, number in zip(terms, sizes, strict=True)
+    )
 
 
 def _name(part: str) -> str:

@@ -28,7 +28,6 @@ class _Bowl:
     """½ |A x − b|² in nats, with unknowns that can hardly be distinguished."""
 
     curved = np.zeros(UNKNOWNS, bool)
-    one_of_many = False
 
     def __init__(self, rng: np.random.Generator) -> None:
         directions = np.linalg.qr(rng.standard_normal((UNKNOWNS, UNKNOWNS)))[0]
@@ -73,7 +72,6 @@ class _Bend:
     def __init__(self, shown: bool, steep: float = 10.0) -> None:
         """shown: whether the descent knows along which unknown the valley is curved."""
         self.curved = np.array([False, shown])
-        self.one_of_many = shown
         self.steep = steep
         self.steps = 0
 
@@ -136,7 +134,6 @@ class _Hidden:
     """½ |r|² of r = (x − ½, 1 − x y, y/100): at x = 0 nothing shows that y could gain."""
 
     curved = np.zeros(2, bool)
-    one_of_many = False
     bounds = CoordinateBounds(np.full(2, -20.0), np.full(2, 20.0))
 
     def tried(self, centre: Array) -> tuple[Array, float]:

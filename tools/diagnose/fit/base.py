@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, blocks_shown
+from gritd.tools.diagnose.fit.random_effect import RandomEffect
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise
@@ -45,7 +45,7 @@ def fit_roughly(stack: Stack) -> BaseFit:
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
 
-    problem = Problem(stack, noise, np.column_stack((allowed(stack), stack.doubts)))
+    problem = Problem(stack, noise, allowed(stack))
     fitted = problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds)
     return BaseFit(problem, Model(fitted))
 
@@ -67,7 +67,7 @@ def explainable(rough: BaseFit) -> Explainable:
 
 def refit(rough: BaseFit, noise: Noise) -> BaseFit:
     """In the noise that was found, what each run does for itself allowed."""
-    problem = for_search(rough, noise)
+    problem = in_noise(rough, noise)
     fitted = problem.descend((), (), rough.fitted.u, np.zeros(0))
     return BaseFit(problem, plain_model(problem, fitted), form_terms(problem.stack, noise))
 
@@ -87,7 +87,7 @@ def sized_beside(
     start: BaseFit, noise: Noise, more: Sequence[RandomEffect], sizes: Chosen
 ) -> BaseFit:
     """The same with given sizes of all terms."""
-    problem = for_search(start, noise)
+    problem = in_noise(start, noise)
     forms = (*form_terms(problem.stack, noise), *more)
     begins = (start.fitted.u, np.zeros(0))
     return BaseFit(problem, sized_model(problem, forms, begins, sizes), forms)
@@ -96,20 +96,13 @@ def sized_beside(
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:
     """Without terms, what each run does for itself allowed."""
     stack = rough.problem.stack
-    return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack), stack.doubts)))
-
-
-def for_search(rough: BaseFit, noise: Noise) -> Problem:
-    """The same where no more noise is learnt: of what the noise hides nothing."""
-    stack = rough.problem.stack
-    shown = blocks_shown(np.column_stack((noise.of_runs, allowed(stack))), noise)
-    return Problem(stack, noise, np.column_stack((shown, stack.doubts)))
+    return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack))))
 
 
 def allowed(stack: Stack) -> Array:
     """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, the relief of the
-    bed. What a learnt discrepancy of the configuration leaves open stands after them.
+    bed, and what a learnt discrepancy of the configuration leaves open, last.
     """
     share = TUNING.fit.tolerance
     smooth = (tolerance(stack, share), share * of_differences(stack))
-    return np.column_stack((*smooth, stack.nuisances))
+    return np.column_stack((*smooth, stack.nuisances, stack.doubts))

@@ -9,12 +9,12 @@ with the columns C (Jacobian, tolerance, terms times their sizes), their prior p
 b = Cᵀr − P centre (Laplace's approximation: MacKay 2003, ch. 27). The strengths of effects have the
 screen's prior: several sizes, and of each effect all strengths or one alone. A parameter that
 stands at its bound is held there: it keeps the density of its prior and has no width of its own.
-Terms that act on values of their own are eliminated first (parted.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -23,13 +23,41 @@ from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
-from gritd.tools.diagnose.fit.parted import Parted, apart
 from gritd.tools.diagnose.fit.problem import Fitted, Free
-from gritd.tools.diagnose.fit.random_effect import RandomEffect
-from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, products
+from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 
 Chosen = tuple[int, ...]  # of each term, which of its sizes
+
+
+@dataclass(frozen=True, eq=False)
+class _Eliminated:
+    """What is left of m kept columns, p strengths and the residual when all else is eliminated.
+
+    gram (m, m), to_strong (m, p), pull (m,) of the kept columns without prior; strong (p, p),
+    strong_pull (p,), centre (p,) of the strengths; misfit and spread of what was eliminated.
+    """
+
+    gram: Array
+    to_strong: Array
+    pull: Array
+    strong: Array
+    strong_pull: Array
+    centre: Array
+    misfit: float
+    spread: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Varied:
+    """products (n + 1, n + 1) of all columns and the residual without what has but one size; spread
+    of that; acting: the unknowns (n,) that are left.
+    """
+
+    products: Array
+    spread: float
+    acting: Bools
 
 
 class Marginal:
@@ -44,20 +72,23 @@ class Marginal:
         allowed = sum(f.columns.count for f in fixed)
         self._ends = known + np.cumsum([0, allowed, *(f.columns.count for f in terms)])
 
-        numbers = set(range(len(self.terms))) - set(apart(self.terms))
-        beside = [self.place_of(n) for n in sorted(numbers)]
-        self._rest = np.concatenate((np.arange(known + allowed), *beside))
-        centre, weight = np.concatenate((fitted.u, fitted.x)), fitted.penalty[:known]
-        more = len(self._rest) - known
-        self._centre = np.concatenate((centre, np.zeros(more)))
-        self._weight = np.concatenate((weight, np.ones(more)))
-        self._held = np.concatenate((fitted.held, np.zeros(more, bool)))
+        size = int(self._ends[-1])
+        self._centre, self._weight = np.zeros(size), np.ones(size)
+        self._centre[:known] = np.concatenate((fitted.u, fitted.x))
+        self._weight[:known] = fitted.penalty[:known]
+        self._held = np.zeros(size, bool)
+        self._held[:known] = fitted.held
 
-        first, own = len(fitted.u), zip(fitted.free, fitted.held[len(fitted.u) :], strict=True)
-        self._strong = np.zeros(len(self._rest), bool)
+        first = len(fitted.u)
+        self._strong = np.zeros(size, bool)
         self._strong[first:known] = [f.parameter.role == "strength" for f in fitted.free]
-        self._strengths = [f for f, held in own if f.parameter.role == "strength" and not held]
-        self._evidence: dict[Chosen, float] = {}
+        self._strengths = [
+            f
+            for i, f in enumerate(fitted.free)
+            if self._strong[first + i] and not fitted.held[first + i]
+        ]
+        self._known: dict[Chosen, float] = {}
+        self._filled: list[set[Chosen]] = [set() for _ in self.terms]
 
     def beside(self, terms: Sequence[RandomEffect]) -> Marginal:
         """The same fit with further terms."""
@@ -65,8 +96,9 @@ class Marginal:
 
     def log_evidence(self, chosen: Chosen) -> float:
         """For given sizes, their prior counted."""
-        self._weigh([chosen])
-        return self._evidence[chosen]
+        if chosen not in self._known:
+            self._known[chosen] = self._log_evidence(chosen)
+        return self._known[chosen]
 
     def likeliest(self, start: Chosen) -> tuple[Chosen, float]:
         """The likeliest sizes, found one term at a time, and the log evidence averaged over
@@ -84,14 +116,15 @@ class Marginal:
             values = [self.log_evidence(c) for c in self._along(chosen, number)]
             average += float(log_sum(values)) - top
 
-        self.__dict__.pop("_parted", None)  # a search keeps many; formed again if asked for
+        for large in ("_products", "_varied"):  # a search keeps many; formed again if asked for
+            self.__dict__.pop(large, None)
         return chosen, average
 
     def gain(self, chosen: Chosen) -> float:
         """What the evidence counts beyond where the fit stands [nats], for given sizes: of the step
         of constants and effect parameters to the optimum by linear algebra.
         """
-        free = np.flatnonzero(~self._fitted.held)
+        free = np.flatnonzero(~self._held[: int(self._ends[0])])
         mean, covariance = self._posterior(chosen, free)
         step = mean - self._centre[free]
         return float(0.5 * step @ np.linalg.solve(covariance, step))
@@ -158,88 +191,162 @@ class Marginal:
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
-        matrix, factor, _ = self._parted.left(chosen)
-        scale = factor[:-1]
-        index = np.flatnonzero((scale > 0.0) & ~self._held)
-        root, last = self._rooted(matrix, index)
-        inside = solve_triangular(root, np.eye(len(index)), lower=True, check_finite=False)
+        scale, acting = self._scaled(chosen)
+        index = np.flatnonzero(acting & ~self._held)
+        prior = self._weight[index] ** 2
+        gram = self._products[np.ix_(index, index)] * scale[index, None] * scale[index]
+        gram[np.diag_indices_from(gram)] += prior
+        pull = self._products[index, -1] * scale[index] - prior * self._centre[index]
 
-        # mean and slope along what is left, of those in it
-        every = np.zeros(self._ends[-1])
-        every[self._rest] = self._centre * scale
-        mean, shared = every[wanted], np.zeros((len(wanted), len(wanted)))
-        linear = np.where(wanted[:, None] == self._rest[index], scale[index], 0.0)
+        root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
+        own = np.isin(wanted, index)
+        units = np.zeros((len(index), int(own.sum())))
+        units[np.searchsorted(index, wanted[own]), np.arange(units.shape[1])] = 1.0
+        solved = solve_triangular(
+            root, np.column_stack((units, pull)), lower=True, check_finite=False
+        )
+        inside, last = solved[:, :-1], solved[:, -1]
 
-        sizes = self._parted.sizes(chosen)
-        for number, part in self._parted.apart.items():
-            size, first = sizes[number], int(self._ends[1 + number])
-            those = np.flatnonzero((wanted >= first) & (wanted < self._ends[2 + number]))
-            if size > 0.0 and those.size:
-                turned = part.vectors[wanted[those] - first] * part.share(size)
-                mean[those] += turned @ part.beside[:, -1]
-                linear[those] -= turned @ part.beside[:, index] * scale[index]
-                shared[np.ix_(those, those)] += turned @ part.vectors[wanted[those] - first].T
-
-        turned = linear @ inside.T
-        return mean + turned @ last, shared + turned @ turned.T
+        mean, shared = self._centre[wanted], np.zeros((len(wanted), len(wanted)))
+        mean[own] += inside.T @ last
+        shared[np.ix_(own, own)] = inside.T @ inside
+        sized = scale[wanted]
+        return mean * sized, shared * np.outer(sized, sized)
 
     def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
         """The same sizes but for one term, which has each of its own; with their evidence."""
         count = len(self.terms[number].sizes.values)
-        every = [(*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)]
-        self._weigh(every)
-        return every
+        if count > 1 and chosen not in self._filled[number]:
+            self._fill(chosen, number)
+            self._filled[number].update(
+                (*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)
+            )
+        return [(*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)]
 
-    def _weigh(self, some: Sequence[Chosen]) -> None:
-        """Makes the log evidence for some sizes known."""
-        new = [chosen for chosen in some if chosen not in self._evidence]
-        if not new:
-            return
-        made = [self._without_weak(chosen) for chosen in new]
-        a, b, known = (np.array(each) for each in zip(*made, strict=True))
-        at = self._centre[self._strong & ~self._held]
-        values = known + strength_evidence(self._strengths, a, b, at)
-        for chosen, value in zip(new, values.tolist(), strict=True):
-            pairs = zip(self.terms, chosen, strict=True)
-            prior = float(sum(f.sizes.log_prior[i] for f, i in pairs))
-            self._evidence[chosen] = prior + value
+    def _fill(self, chosen: Chosen, number: int) -> None:
+        """The log evidence for each size of one term, all others as chosen.
 
-    def _without_weak(self, chosen: Chosen) -> tuple[Array, Array, float]:
-        """Curvature (p, p) and slope (p,) of the strengths, all else eliminated, and the log
-        evidence where these stand [nats]; by factors.
+        What is not this term is eliminated once; in the eigenvectors of what remains of it, each
+        of its sizes is a matter of its eigenvalues.
         """
-        matrix, factor, spread = self._parted.left(chosen)
-        acting = factor[:-1] > 0.0
-        weak = np.flatnonzero(acting & ~self._held & ~self._strong)
-        strong = np.flatnonzero(acting & ~self._held & self._strong)
-        centre, prior = self._centre[weak], self._weight[weak] ** 2
-        root, last = self._rooted(matrix, weak)
+        begin, end = int(self._ends[1 + number]), int(self._ends[2 + number])
+        scale, acting = self._scaled(chosen)
+        scale[begin:end] = 1.0
+        acting[begin:end] = False
+        rest = self._eliminated(scale, acting, np.arange(begin, end))
 
-        inside = solve_triangular(
-            root, matrix[np.ix_(weak, strong)], lower=True, check_finite=False
-        )
-        held = self._held & ~self._strong
-        strain = prior @ centre**2 + np.sum((self._weight[held] * self._centre[held]) ** 2)
-        misfit = matrix[-1, -1] + strain - last @ last
-        spread += 2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum())
-        return (
-            matrix[np.ix_(strong, strong)] - inside.T @ inside,
-            matrix[strong, -1] - inside.T @ last,
-            -0.5 * float(misfit + spread),
-        )
+        values, vectors = np.linalg.eigh(rest.gram)
+        values = np.maximum(values, 0.0)
+        turned = vectors.T @ rest.to_strong
+        pulled = vectors.T @ rest.pull
+        square = np.array(self.terms[number].sizes.values)[:, None] ** 2
+        share = square / (1.0 + square * values)  # (sizes, columns of the term)
+        misfit = rest.misfit - share @ pulled**2
+        spread = rest.spread + np.log1p(square * values).sum(axis=1)
+        a = rest.strong - turned.T @ (share[:, :, None] * turned)
+        b = rest.strong_pull - (share * pulled) @ turned
+        strength = strength_evidence(self._strengths, a, b, rest.centre)
+        for which, known in enumerate((strength - 0.5 * (misfit + spread)).tolist()):
+            these = (*chosen[:number], which, *chosen[number + 1 :])
+            self._known[these] = self._prior(these) + known
 
-    def _rooted(self, matrix: Array, index: Index) -> tuple[Array, Array]:
-        """Cholesky root (n, n) of the products of some unknowns with their prior, and L⁻¹b (n,)."""
-        prior = self._weight[index] ** 2
-        gram = matrix[np.ix_(index, index)]
+    def _prior(self, chosen: Chosen) -> float:
+        """Log prior of given sizes."""
+        pairs = zip(self.terms, chosen, strict=True)
+        return float(sum(f.sizes.log_prior[i] for f, i in pairs))
+
+    def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
+        """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
+        varied = self._varied
+        acting = acting & varied.acting
+        weak = np.flatnonzero(acting & ~self._strong)
+        strong = np.flatnonzero(acting & self._strong)
+        prior, centre = self._weight[weak] ** 2, self._centre[weak]
+
+        beside = np.concatenate((kept, strong, [-1]))
+        index = np.concatenate((weak, beside))
+        columns = varied.products[np.ix_(index, beside)] * scale[index, None] * scale[beside]
+        gram = varied.products[np.ix_(weak, weak)] * scale[weak, None] * scale[weak]
         gram[np.diag_indices_from(gram)] += prior
         root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
-        pull = matrix[index, -1] - prior * self._centre[index]
-        return root, solve_triangular(root, pull, lower=True, check_finite=False)
+
+        columns[: len(weak), -1] -= prior * centre
+        inside = solve_triangular(root, columns[: len(weak)], lower=True, check_finite=False)
+        own, last = inside[:, :-1], inside[:, -1]
+        matrix = columns[len(weak) : -1, :-1] - own.T @ own
+        right = columns[len(weak) : -1, -1] - own.T @ last
+
+        count = len(kept)
+        strain = np.sum(prior * centre**2) + self._strain_of_held()
+        return _Eliminated(
+            gram=matrix[:count, :count],
+            to_strong=matrix[:count, count:],
+            pull=right[:count],
+            strong=matrix[count:, count:],
+            strong_pull=right[count:],
+            centre=self._centre[strong],
+            misfit=float(columns[-1, -1] + strain - last @ last),
+            spread=varied.spread
+            + 2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
+        )
 
     @cached_property
-    def _parted(self) -> Parted:
-        return Parted(self._fitted.own, self._fixed, self.terms, self._fitted.residual)
+    def _products(self) -> Array:
+        """Of all columns and the residual with one another."""
+        return _products(self._fitted, (*self._fixed, *self.terms))
+
+    @cached_property
+    def _varied(self) -> _Varied:
+        """What is left where all that has but one size is eliminated."""
+        once = [True, *(len(f.sizes.values) == 1 for f in self.terms)]
+        begins = zip(self._ends[:-1], self._ends[1:], once, strict=True)
+        usual = np.concatenate([np.arange(a, b) for a, b, same in begins if same])
+        acting = ~self._held
+        acting[usual] = False
+
+        scale, _ = self._scaled(tuple(0 for _ in self.terms))
+        own = self._products[np.ix_(usual, usual)] * scale[usual, None] * scale[usual]
+        own[np.diag_indices_from(own)] += 1.0
+        root = cholesky(own, lower=True, overwrite_a=True, check_finite=False)
+        beside = scale[usual, None] * self._products[usual]
+        inside = solve_triangular(root, beside, lower=True, check_finite=False)
+        spread = 2.0 * float(np.log(np.diag(root)).sum())
+        return _Varied(self._products - inside.T @ inside, spread, acting)
+
+    def _log_evidence(self, chosen: Chosen) -> float:
+        scale, acting = self._scaled(chosen)
+        none = np.zeros(0, dtype=np.intp)
+        rest = self._eliminated(scale, acting, none)
+        strength = strength_evidence(self._strengths, rest.strong, rest.strong_pull, rest.centre)
+        return self._prior(chosen) + float(strength) - 0.5 * (rest.misfit + rest.spread)
+
+    def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:
+        """Factors of all columns and the residual; which columns act."""
+        scale, acting = np.ones(len(self._centre) + 1), np.ones(len(self._centre), bool)
+        for term, number, first, last in zip(
+            self.terms, chosen, self._ends[1:-1], self._ends[2:], strict=True
+        ):
+            scale[first:last] = term.sizes.values[number]
+            acting[first:last] = term.sizes.values[number] > 0.0
+        return scale, acting
+
+    def _strain_of_held(self) -> float:
+        held = self._held & ~self._strong
+        return float(np.sum((self._weight[held] * self._centre[held]) ** 2))
+
+
+def _products(fitted: Fitted, terms: Sequence[RandomEffect]) -> Array:
+    """Of the derivatives, the columns of all terms, and the residual with one another."""
+    own = np.column_stack((fitted.own, fitted.residual))
+    beside = np.concatenate([f.whitened.pulled(own) for f in terms])
+    square = own.T @ own
+    return np.block(
+        [
+            [square[:-1, :-1], beside[:, :-1].T, square[:-1, -1:]],
+            [beside[:, :-1], products(terms), beside[:, -1:]],
+            [square[-1:, :-1], beside[:, -1:].T, square[-1:, -1:]],
+        ]
+    )
 
 
 def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> Array:

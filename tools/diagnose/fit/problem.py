@@ -286,18 +286,15 @@ class EffectsObjective:
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with the derivatives of a fit near by, as the way there corrects them."""
         problem = self._problem
-        raw, own, pulled, step = here.raw, here.own, here.pulled, tried.centre - here.centre
-        same = here.nuisance is problem.nuisance
-        if same and not step.any():
-            return self._fitted(tried, raw, own, pulled, here.curvature)
+        raw, own, step = here.raw, here.own, tried.centre - here.centre
         if step.any():
             missed = tried.predicted - here.predicted - raw @ step
-            whitened, along = whiten(problem.noise, missed), step / (step @ step)
-            raw, own = raw + np.outer(missed, along), own + np.outer(whitened, along)
-            if same:
-                pulled = pulled + np.outer(problem.nuisance.pulled(whitened), along)
-        if not same:
-            pulled = problem.nuisance.pulled(own)
+            along = step / (step @ step)
+            raw = raw + np.outer(missed, along)
+            own = own + np.outer(whiten(problem.noise, missed), along)
+        elif here.nuisance is problem.nuisance:
+            return self._fitted(tried, raw, own, here.pulled, here.curvature)
+        pulled = problem.nuisance.pulled(own)
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def followed(self, here: Fitted, tried: Tried) -> Fitted:

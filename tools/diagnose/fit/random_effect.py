@@ -17,7 +17,6 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.columns import Columns, columns_of, whitened
 from gritd.tools.diagnose.noise.colour import Noise
-from gritd.tools.diagnose.tuning import TUNING
 
 Kind = Literal["", "form", "profile", "place", "law"]
 
@@ -77,31 +76,17 @@ def random_effect(
     return RandomEffect(name, own, whitened(noise, own), sizes, least, kind)
 
 
-def blocks_shown(columns: Array, noise: Noise) -> Array:
-    """Combinations of columns (N, m) in the channels' units, of those that act on the same values
-    each; without those that the noise hides altogether.
-    """
-    own, least = columns_of(columns), TUNING.numerics.least_allowed
-    pairs = zip(own.blocks, whitened(noise, own).blocks, strict=True)
-    kept = [(rows, shown(block, white, least)) for (rows, block), (_, white) in pairs]
-    return Columns(len(columns), tuple(kept)).dense
-
-
-def shown(columns: Array, whitened: Array, least: float) -> Array:
-    """Combinations of columns with the same covariance, the largest first; without those that
-    are less than a share of the noise altogether.
-    """
-    if not columns.shape[1]:
-        return columns
-    values, vectors = np.linalg.eigh(whitened.T @ whitened)
-    return np.asarray(columns @ vectors[:, np.flatnonzero(values > least)[::-1]])
-
-
 def products(parts: Sequence[RandomEffect]) -> Array:
-    """WᵀW (m, m) of the whitened columns of terms side by side."""
+    """WᵀW (m, m) of the whitened columns of terms side by side; of any two formed once, since
+    hundreds of fits share them.
+    """
     if not parts:
         return np.zeros((0, 0))
-    return np.block([[between(a, b) for b in parts] for a in parts])
+    rows = [
+        [_between(a, b) if i <= j else _between(b, a).T for j, b in enumerate(parts)]
+        for i, a in enumerate(parts)
+    ]
+    return np.block(rows)
 
 
 _formed: WeakKeyDictionary[RandomEffect, WeakKeyDictionary[RandomEffect, Array]] = (
@@ -109,13 +94,8 @@ _formed: WeakKeyDictionary[RandomEffect, WeakKeyDictionary[RandomEffect, Array]]
 )
 
 
-def between(a: RandomEffect, b: RandomEffect) -> Array:
-    """Products (m, k) of the whitened columns of two terms; formed once, since hundreds of fits
-    share them.
-    """
-    known, other = (_formed.setdefault(each, WeakKeyDictionary()) for each in (a, b))
-    if a in other:
-        return np.asarray(other[a].T)
+def _between(a: RandomEffect, b: RandomEffect) -> Array:
+    known = _formed.setdefault(a, WeakKeyDictionary())
     if b not in known:
         known[b] = a.whitened.gram if a is b else a.whitened.products(b.whitened)
     return known[b]

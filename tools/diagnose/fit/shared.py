@@ -33,7 +33,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, joined, scale_of
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect, shown
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.fit.ripples import line_waves
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -172,9 +172,10 @@ def shared_terms(
 ) -> tuple[RandomEffect, ...]:
     """Terms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = {part: even(TUNING.fit.shared_sizes) for part in shared} | {STARTS: form_sizes()}
-    least, most = TUNING.numerics.shared_least, TUNING.numerics.shared_most
-    kept = {p: shown(c, whiten(noise, c), least)[:, :most] for p, c in shared.items()}
-    terms = [random_effect(_name(p), c, noise, sizes[p]) for p, c in kept.items()]
+    terms = [
+        random_effect(_name(part), _reduced(columns, whiten(noise, columns)), noise, sizes[part])
+        for part, columns in shared.items()
+    ]
     terms.append(random_effect("ripples in both", ripples, noise, Sizes()))
     return tuple(f for f in terms if f.columns.count)
 
@@ -192,6 +193,19 @@ def lasting(terms: Sequence[RandomEffect], sizes: Chosen) -> tuple[RandomEffect,
 
 def _name(part: str) -> str:
     return f"{part} in both"
+
+
+def _reduced(columns: Array, whitened: Array) -> Array:
+    """Combinations of columns with the same covariance, the largest first; without those that
+    are less than the noise altogether.
+    """
+    if not columns.shape[1]:
+        return columns
+    values, vectors = np.linalg.eigh(whitened.T @ whitened)
+    large = np.flatnonzero(values > TUNING.numerics.shared_least)[::-1][
+        : TUNING.numerics.shared_most
+    ]
+    return np.asarray(columns @ vectors[:, large])
 
 
 def _level(stack: Stack, parts: Sequence[Index]) -> float:

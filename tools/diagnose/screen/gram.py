@@ -3,11 +3,15 @@ discrepancy.
 
 Around its fit a model is linear in its unknowns, each of a unit normal prior: constants and effect
 parameters in prior σ, tolerances, other forms of its effects, and the discrepancy of form δ times
-its sizes s. With the whitened columns F of all but δ, S of what is looked for, and the residual r,
-of whose products with one another fit/parted.py leaves G(s) where δ is eliminated:
+its sizes s. With the whitened columns F of all but δ, D of δ for sizes of 1, S of what is looked
+for, and the residual r, the normal equations with F eliminated are
 
-    M Mᵀ = I + G_FF,   y = M⁻¹ G_Fr,   V = M⁻¹ G_FS
-    e₀(s) = ln p(s) − ½(G_rr + strain² − yᵀy) − Σ ln diag M − ½ ln det
+    L Lᵀ = I + FᵀF,   X = L⁻¹FᵀX for X = D, S, r,   G = [D S r]ᵀ[D S r] − [D S r]ᵀ[D S r] of these,
+
+formed once. For each of some sizes s of δ
+
+    M Mᵀ = I + s G_DD s,   y = M⁻¹ s G_Dr,   V = M⁻¹ s G_DS
+    e₀(s) = ln p(s) − ½(G_rr + strain² − yᵀy) − Σ ln diag L − Σ ln diag M
     A(s) = G_SS − VᵀV,     b(s) = G_Sr − Vᵀy.
 
 (Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14.) A constant that stands at its bound keeps
@@ -17,32 +21,38 @@ its prior width.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.columns import Columns, joined, whole
 from gritd.tools.diagnose.fit.evidence import log_sum
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.parted import Parted
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.random_effect import RandomEffect
-from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.interface import Bools, Index
 
 
 @dataclass(frozen=True, eq=False)
 class Sized:
-    """One size of every term: which, its log evidence e₀ [nats]; factors (r,) of the columns F, the
-    root M (r, r) and y (r,).
+    """One size of every discrepancy: which, its log evidence e₀ [nats]; of the columns of δ that
+    act (k,) their size, the root M (k, k) and y (k,).
     """
 
     chosen: Chosen
     evidence: float
-    factor: Array
+    acting: Index
+    size: Array
     root: Array
     y: Array
+
+    def solved(self, products: Array) -> Array:
+        """M⁻¹ s G (k, m) of products G (d, m) with all columns of δ."""
+        scaled = self.size[:, None] * products[self.acting]
+        return np.asarray(solve_triangular(self.root, scaled, lower=True, check_finite=False))
 
 
 class Gram:
@@ -51,30 +61,25 @@ class Gram:
     def __init__(self, problem: Problem, model: Model, rows: Bools | None = None) -> None:
         """rows: marks the values (N,) that count; if not given, all."""
         forms, chosen = _terms(model)
-        fitted, fixed = model.fitted, problem.fixed
-        self._own = fitted.own / fitted.penalty[: fitted.centre.size]
-        self._residual = fitted.residual
+        self._fixed = _fixed_columns(problem, model)
+        self._form = joined(problem.stack.size, [f.whitened for f in forms])
+        self._forms, self._residual = forms, model.fitted.residual
         if rows is not None:
-            self._own, self._residual = self._own * rows[:, None], self._residual * rows
-            forms, fixed = (tuple(_of_rows(f, rows) for f in each) for each in (forms, fixed))
+            self._fixed, self._form = self._fixed.of_rows(rows), self._form.of_rows(rows)
+            self._residual = self._residual * rows
 
-        self._forms = forms
-        self._parted = Parted(self._own, fixed, forms, self._residual)
-        self._strain = fitted.centre * fitted.penalty[: fitted.centre.size]
-        self.sizes = [self._sized(some) for some in _about(chosen, forms)]
+        self._root = _root(self._fixed)
+        strain = np.zeros(self._fixed.count)
+        known = model.fitted.centre.size
+        strain[:known] = model.fitted.centre * model.fitted.penalty[:known]
+        self._pulled = _solved(self._root, self._fixed.pulled(self._residual) - strain)
+        self._inside = _solved(self._root, self._fixed.products(self._form))
 
-    def _sized(self, chosen: Chosen) -> Sized:
-        left, factor, det = self._parted.left(chosen)
-        products, score = left[:-1, :-1], left[:-1, -1]
-        products[np.diag_indices_from(products)] += 1.0
-        score[: self._strain.size] -= self._strain
-        root = np.asarray(cholesky(products, lower=True, check_finite=False))
-        y = _solved(root, score)
-
-        misfit = left[-1, -1] + self._strain @ self._strain - y @ y
-        spread = float(np.log(np.diag(root)).sum()) + 0.5 * det
-        prior = sum(f.sizes.log_prior[n] for f, n in zip(self._forms, chosen, strict=True))
-        return Sized(chosen, float(prior - 0.5 * misfit - spread), factor[:-1], root, y)
+        gram = self._form.gram - self._inside.T @ self._inside
+        score = self._form.pulled(self._residual) - self._inside.T @ self._pulled
+        misfit = self._residual @ self._residual + strain @ strain - self._pulled @ self._pulled
+        alone = -0.5 * float(misfit) - float(np.log(np.diag(self._root)).sum())
+        self.sizes = [_sized(gram, score, alone, forms, some) for some in _about(chosen, forms)]
 
     @property
     def evidence(self) -> Array:
@@ -104,36 +109,15 @@ class Gram:
 
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (s, m, m) and b (s, m) of whitened columns (N, m) for each of the sizes."""
-        pulled = [f.whitened.pulled(columns) for f in self._parted.rest]
-        scores = self._residual @ columns
-        whole = np.vstack((self._own.T @ columns, *pulled, scores, columns.T @ columns))
-        taken = self._taken(columns)
+        inside = _solved(self._root, self._fixed.pulled(columns))
+        squares = columns.T @ columns - inside.T @ inside
+        scores = columns.T @ self._residual - inside.T @ self._pulled
+        shared = self._form.pulled(columns) - self._inside.T @ inside
 
-        a, b = [], []
-        for one in self.sizes:
-            sizes, count = self._parted.sizes(one.chosen), len(one.y)
-            left = whole - sum(of_size[sizes[number]] for number, of_size in taken.items())
-            v = _solved(one.root, one.factor[:, None] * left[:count])
-            a.append(left[count + 1 :] - v.T @ v)
-            b.append(left[count] - v.T @ one.y)
-        return np.stack(a), np.stack(b)
-
-    def _taken(self, columns: Array) -> dict[int, dict[float, Array]]:
-        """What a term that acts on values of its own takes of the products of F, the residual and
-        columns (N, m) with these (r + 1 + m, m), by its number and size.
-        """
-        taken = {}
-        for number, part in self._parted.apart.items():
-            turned = part.turned(columns)
-            beside = np.hstack((part.beside, turned)).T
-            sizes = {self._parted.sizes(one.chosen)[number] for one in self.sizes}
-            taken[number] = {s: beside @ (part.share(s)[:, None] * turned) for s in sizes}
-        return taken
-
-
-def _of_rows(term: RandomEffect, rows: Bools) -> RandomEffect:
-    """As the marked values (N,) alone tell it."""
-    return replace(term, whitened=term.whitened.of_rows(rows))
+        turned = [one.solved(shared) for one in self.sizes]
+        a = np.stack([squares - v.T @ v for v in turned])
+        b = np.stack([scores - v.T @ one.y for v, one in zip(turned, self.sizes, strict=True)])
+        return a, b
 
 
 def _terms(model: Model) -> tuple[Sequence[RandomEffect], Chosen]:
@@ -141,6 +125,32 @@ def _terms(model: Model) -> tuple[Sequence[RandomEffect], Chosen]:
     fit.
     """
     return (model.marginal.terms, model.chosen) if model.marginal is not None else ((), ())
+
+
+def _fixed_columns(problem: Problem, model: Model) -> Columns:
+    """What has one size (N, q), each column one standard deviation."""
+    fitted = model.fitted
+    own = whole(fitted.own / fitted.penalty[: fitted.centre.size])
+    return joined(problem.stack.size, (own, *(f.whitened for f in problem.fixed)))
+
+
+def _sized(
+    gram: Array, score: Array, alone: float, forms: Sequence[RandomEffect], chosen: Chosen
+) -> Sized:
+    values = [f.sizes.values[n] for f, n in zip(forms, chosen, strict=True)]
+    widths = [f.columns.count for f in forms]
+    every = np.repeat(np.array(values), widths)
+    acting = np.flatnonzero(every)
+    size = every[acting]
+
+    products = gram[np.ix_(acting, acting)] * size[:, None] * size
+    products[np.diag_indices_from(products)] += 1.0
+    root = np.asarray(cholesky(products, lower=True, overwrite_a=True, check_finite=False))
+    y = _solved(root, size * score[acting])
+
+    prior = sum(float(f.sizes.log_prior[n]) for f, n in zip(forms, chosen, strict=True))
+    spread = float(np.log(np.diag(root)).sum())
+    return Sized(chosen, prior + alone + 0.5 * float(y @ y) - spread, acting, size, root, y)
 
 
 def _about(chosen: Chosen, forms: Sequence[RandomEffect]) -> list[Chosen]:
@@ -157,6 +167,13 @@ def _about(chosen: Chosen, forms: Sequence[RandomEffect]) -> list[Chosen]:
         for k in range(1 - most, most)
     ]
     return list(dict.fromkeys([chosen, *alone, *steps]))
+
+
+def _root(columns: Columns) -> Array:
+    """Cholesky root (q, q) of the products of columns (N, q) and their unit prior."""
+    gram = columns.gram
+    gram[np.diag_indices_from(gram)] += 1.0
+    return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 
 
 def _solved(root: Array, right: Array) -> Array:

@@ -13,6 +13,7 @@ from gritd.estimator.effects import make
 from gritd.estimator.stages.history import followed
 from gritd.tools.diagnose.fit.discrepancy import joined
 from gritd.tools.diagnose.fit.shared import (
+    _reduced,
     rippling_columns,
     shared_columns,
     without_ripples,
@@ -22,6 +23,14 @@ from gritd.tools.proof.ours.cases import record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan
 
 pytestmark = pytest.mark.long
+
+
+def test_the_reduced_columns_have_the_same_covariance() -> None:
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((200, 6)) @ rng.standard_normal((6, 40))
+    reduced = _reduced(3.0 * columns, columns)
+    assert reduced.shape == (200, 6)
+    np.testing.assert_allclose(reduced @ reduced.T, 9.0 * columns @ columns.T, atol=1e-7)
 
 
 def _columns(acting: tuple[Any, ...], seed: int, seconds: float = 60.0) -> tuple[Stack, Any]:

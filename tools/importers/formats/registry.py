@@ -26,7 +26,6 @@ class Format:
     package: str = ""
 
 
-ZIPPED = b"PK\x03\x04"  # several kinds of file are
 FORMATS = (
     Format((".parquet",), parquet.read, (b"PAR1",), "pyarrow"),
     Format((".h5", ".hdf5", ".hdf", ".he5", ".nc"), hdf5.read, (b"\x89HDF\r\n",), "h5py"),

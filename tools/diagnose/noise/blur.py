@@ -16,6 +16,9 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     Averaging takes a share of the second difference, a value's or its neighbours'; and a lagging
     axle shifts all forces by the share by which the sinkage changes within the lag. While the motor
     stands idle nothing changes, next to a start neither.
+
+    Runs that change in the same way err in the same way: as the error of one reading in each of
+    them it is so much larger that all of them tell what one does.
     """
     if stack.rig.filtered:
         return np.zeros(stack.size)
@@ -27,7 +30,7 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / stack.gaps
 
     bent = TUNING.noise.bend * _nearby(np.where(edge, 0.0, bend))
-    blur = np.hypot(bent, TUNING.noise.lag * _nearby(late))
+    blur = np.hypot(bent, TUNING.noise.lag * _nearby(late)) * np.sqrt(len(stack.rig.runs))
     blur = np.where(stack.idle & (stack.covariate("speed") == 0.0), 0.0, blur)
     return np.hypot(blur, _of_reversal(stack, predicted))
 

@@ -11,7 +11,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 def blur_of(stack: Stack, predicted: Array) -> Array:
     """Error (N,) where a prediction (N,) changes, in the channels' units; nothing where prediction
-    and recording go through the same filter.
+    and recording go through the same filter, nor between the steady states of a table.
 
     Averaging takes a share of the second difference, a value's or its neighbours'; and a lagging
     axle shifts all forces by the share by which the sinkage changes within the lag. While the motor
@@ -20,7 +20,7 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     Runs that change in the same way err in the same way: as the error of one reading in each of
     them it is so much larger that all of them tell what one does.
     """
-    if stack.rig.filtered:
+    if stack.rig.filtered or stack.rig.tabled:
         return np.zeros(stack.size)
     bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
     edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))

@@ -4,7 +4,9 @@ speeds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -58,6 +60,7 @@ class Design:
     second_pass: bool | None = None
     speeds: bool | None = None
     wrench: bool | None = None
+    staircase: bool | None = None  # the load changes within a run
     weighed: bool = False  # runs do not state their load, the wrench tells it
 
 
@@ -75,15 +78,17 @@ def design_drawn(rng: np.random.Generator, fixed: Design | None = None) -> Desig
         "second_pass": bool(rng.random() < 0.25),
         "speeds": bool(rng.random() < 0.6),
         "wrench": bool(rng.random() < 0.7),
+        "staircase": bool(rng.random() < 0.2),
     }
     chosen: dict[str, Any] = {
         name: value for name, value in drawn.items() if getattr(fixed, name) is None
     }
 
     design = replace(fixed, **chosen)
-    return replace(
-        design, lifted=bool(design.lifted and design.wrench)
-    )  # nothing else tells that the load is off
+    staircase, lifted = design.staircase and design.wrench, design.lifted and design.wrench
+    # nothing else tells that the load is off, or another
+    weighed = design.weighed or bool(staircase)
+    return replace(design, lifted=bool(lifted), staircase=bool(staircase), weighed=weighed)
 
 
 def campaign(
@@ -91,7 +96,8 @@ def campaign(
 ) -> tuple[BlindRun, ...]:
     """Runs over soil that was prepared anew, but for second passes."""
     count = design.runs or 1
-    weights = _weights(rig, ground, min(count, design.loads or 4), rng)
+    most = (design.loads or 4) if design.staircase else min(count, design.loads or 4)
+    weights = _weights(rig, ground, most, rng)
     runs: list[BlindRun] = []
     begins = 0.0
 
@@ -99,7 +105,8 @@ def campaign(
         again = bool(design.second_pass) and number > 0 and rng.random() < 0.5
         weight = runs[-1].weight if again else weights[number % len(weights)]
 
-        run = _run(rig, design, weight, rng)
+        loads = [float(load) for load in rng.permutation(weights)] if design.staircase else [weight]
+        run = _run(design, loads, rng)
         passes, start = (runs[-1].passes + 1, runs[-1].start) if again else (1, _start(rng))
         runs.append(replace(run, passes=passes, start=start, begins=begins))
 
@@ -125,10 +132,14 @@ def _weights(rig: TrueRig, ground: PlantSoil, count: int, rng: np.random.Generat
     return [rounded[place] for place in rng.permutation(count)]
 
 
-def _run(rig: TrueRig, design: Design, weight: float, rng: np.random.Generator) -> BlindRun:
+def _run(design: Design, loads: Sequence[float], rng: np.random.Generator) -> BlindRun:
+    """loads: [N] of its stretches, in turn."""
     usual = float(rng.uniform(0.015, 0.04))
     slips = rng.permutation(np.linspace(*SLIPS, int(rng.integers(4, 7)))) + rng.uniform(-0.02, 0.02)
-    stretches = [_stretch(weight, float(slip), usual, design, rng) for slip in slips]
+    stretches = [
+        _stretch(load, float(slip), usual, design, rng)
+        for slip, load in zip(slips, cycle(loads), strict=False)
+    ]
 
     if design.reversal:
         stretches[-2:] = [
@@ -138,7 +149,7 @@ def _run(rig: TrueRig, design: Design, weight: float, rng: np.random.Generator) 
     if design.lifted:
         stretches.append(DrivenStretch(4.0, 0.0, 0.0, usual))
     if design.standstill:
-        stretches.insert(0, DrivenStretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
+        stretches.insert(0, DrivenStretch(float(rng.uniform(1.5, 3.0)), loads[0], 0.1, 0.0))
 
     ramp = float(rng.uniform(*RAMP))
     return BlindRun(tuple(stretches), ramp, 1, 0.0, 0.0)

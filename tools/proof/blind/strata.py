@@ -63,6 +63,16 @@ AWKWARD = (
     Assignment("awkward", level="correlated 0.95", noise="slow"),
     Assignment("awkward", level="no wrench", without=(("wrench", False),)),
     Assignment("awkward", level="one run", without=(("runs", 1),)),
+    Assignment(
+        "awkward",
+        level="many runs",
+        without=(("runs", 40), ("loads", 4), ("staircase", True), ("wrench", True)),
+    ),
+    Assignment(
+        "awkward",
+        level="loads in a run",
+        without=(("loads", 4), ("staircase", True), ("wrench", True)),
+    ),
 )
 
 

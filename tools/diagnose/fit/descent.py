@@ -96,11 +96,16 @@ class Objective(Protocol[Linearised, Tried]):
 
 
 def descend(
-    ground: Objective[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
+    ground: Objective[Here, Tried],
+    start: Here,
+    rounds: int,
+    unsure: Tried | None = None,
+    foretold: bool = False,
 ) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one.
 
-    unsure: where it stands, if its slopes are those of another place.
+    unsure: where it stands, if its slopes are those of another place; foretold: whether these do
+    until a step fails.
     """
     here, damping, failed = start, TUNING.numerics.damping_start, False
 
@@ -108,7 +113,7 @@ def descend(
         better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
             done = abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
-            if done and unsure is None:
+            if done and (unsure is None or foretold):
                 return here, True
             if unsure is not None and (done or failed):  # by these slopes
                 here, unsure, failed = ground.linearised(unsure), None, False
@@ -128,11 +133,11 @@ def descend(
         if better is None:
             return here, False
         # a search looks at many curved valleys: there slopes that foretold the step will do
-        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
-        here, unsure = ground.moved(here, better), None if foretold else better
+        foretold = bool(ground.curved.any()) and abs(share - 1.0) < 1.0 - TUNING.numerics.good
+        here, unsure = ground.moved(here, better), better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
-    if unsure is not None:
+    if unsure is not None and not foretold:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
 

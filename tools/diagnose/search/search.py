@@ -150,13 +150,12 @@ def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
     the effect's strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
-    u, made = model.fitted.u, None
-    for known in (0.0 * u, u) if model.fitted.held[: u.size].any() else (u,):
-        fits = [_fitted_with(search, predicted, p.start, p.sizes, known) for p in predicted.starts]
-        made = max(filter(None, (made, *fits)), key=lambda m: m.evidence)
-        if made.evidence > predicted.evidence - TUNING.search.little:
-            return made
-    assert made is not None
+    begins = [(one.start, one.sizes, model.fitted.u) for one in predicted.starts]
+    if model.fitted.held[: model.fitted.u.size].any():
+        begins += [(start, sizes, 0.0 * u) for start, sizes, u in begins]
+    made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
+    if made.evidence > predicted.evidence - TUNING.search.little:
+        return made
 
     again = [(predicted.starts[0].start, tuple(0 for _ in model.chosen), model.fitted.u)]
     if made.evidence <= model.evidence - TUNING.search.little:

@@ -1,0 +1,48 @@
+"""What averages and slopes of a moving wheel blur, and how much the blurred values tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.tools.diagnose.noise.blur import blur_of
+from gritd.tools.diagnose.rig.stack import Stack
+from gritd.tools.diagnose.rig.wheel import wheel_rig
+from gritd.tools.proof.ours.cases import record
+from tests.scenarios.commands import CONFIG, in_process
+from tests.tools.diagnose.campaigns import plan, settings
+
+
+def blur_of_runs(count: int) -> float:
+    """Root mean square blur of the pull [N] of a campaign of so many runs."""
+    stack = Stack(wheel_rig(record(plan((70.0,) * count, 12.0, noise=0.0), ()), settings()))
+    blur = blur_of(stack, stack.predict(np.zeros(len(stack.rig.constants))))
+    return float(np.sqrt(np.mean(blur[stack.of("drawbar_pull")] ** 2)))
+
+
+def test_runs_that_change_alike_tell_no_more_of_a_change_than_one_set_of_them() -> None:
+    """The blur is an error of the model: it is the same in all of them, and their mean has it in
+    full. In the second six runs orders and speeds come again.
+    """
+    for_one, for_all = blur_of_runs(6) / np.sqrt(6.0), blur_of_runs(12) / np.sqrt(12.0)
+    assert for_all == pytest.approx(for_one, rel=0.05)
+
+
+def test_steady_states_have_no_change_between_them() -> None:
+    rig = replace(wheel_rig(record(plan(seconds=12.0), ()), settings()), tabled=True)
+    stack = Stack(rig)
+    assert not blur_of(stack, stack.measured).any()
+
+
+@pytest.mark.long
+def test_many_runs_whose_load_changes_meanwhile_give_no_alarm(tmp_path: Path) -> None:
+    """Together they are so long that a value is a mean over 0.4 s, in which the load changes."""
+    files = [str(tmp_path / f"{number}.mcap") for number in range(24)]
+    for seed, file in enumerate(files):
+        assert in_process("simulate", "--seed", str(seed), "-o", file)[0] == 0
+    code, said = in_process("diagnose", *files, *CONFIG)
+    assert code == 0
+    assert any(line.startswith("verdict: consistent") for line in said)

@@ -135,10 +135,13 @@ def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
 
 
 class _Where:
-    """What a channel's residual is, as more or less than the model."""
+    """What a channel's residual is, as more or less than the model: in the new campaign, where a
+    reference comes first.
+    """
 
     def __init__(self, stack: Stack, residual: Array, channel: str) -> None:
         own = stack.of(channel)
+        own = own & stack.new if (own & stack.new).any() else own
         driving = own & (stack.covariate("speed") > 0.0)
         self._stack, self._residual = stack, residual
         self._own = driving if driving.any() else own
@@ -190,10 +193,13 @@ class _Where:
         x = self._stack.covariate(covariate)
         low, high = (*places, np.inf)[:2]
         inside = self._own & (x > low) & (x <= high)
-        if len(places) == 1 and abs(self._mean(inside)) < abs(self._mean(self._own & ~inside)):
-            low, high, inside = -np.inf, low, self._own & ~inside
+        outside = self._own & ~inside
+        if not inside.any() or not outside.any():
+            return self.everywhere()
+        if len(places) == 1 and abs(self._mean(inside)) < abs(self._mean(outside)):
+            low, high, inside, outside = -np.inf, low, outside, inside
 
-        here, elsewhere = self._mean(inside), _brief(self._say(self._mean(self._own & ~inside)))
+        here, elsewhere = self._mean(inside), _brief(self._say(self._mean(outside)))
         if covariate != "run":
             return f"{self._span(covariate, low, high)} {self._say(here)}, elsewhere {elsewhere}"
         names = [name for number, name in self._names().items() if low < number <= high]

@@ -30,3 +30,13 @@ def test_one_that_differs_from_run_to_run_is_told_of_each(stack: Stack) -> None:
     shown = sentence(stack, 0.1 * (1.0 + stack.run), BY_RUN, "run", 0.99)
     assert "from run to run" in shown
     assert "0.10 N·m more" in shown and "0.30 N·m more" in shown
+
+
+def test_a_misfit_beside_a_reference_is_that_of_the_new_campaign() -> None:
+    """Half of the values are the reference's, which has none of it."""
+    before, after = (plan(standstill=False, seed=seed) for seed in (1, 2))
+    signals = [*record(before, []), *record(after, [])]
+    both = Stack(wheel_rig(signals, after.settings, len(signals) // 2, "same"))
+    everywhere = Shape("torque", ("constant",), "smooth")
+    shown = sentence(both, np.where(both.new, 0.8, 0.0), everywhere, "constant", 0.99)
+    assert shown.startswith("Torque, everywhere 0.80 N·m more than the model")

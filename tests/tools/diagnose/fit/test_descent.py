@@ -171,7 +171,7 @@ def test_slopes_of_another_place_do_until_a_step_fails() -> None:
     given.
     """
     hidden, at = _Hidden(), np.array([0.3, 0.2])
-    misled = hidden.moved(hidden.linearised(np.array([-3.0, 8.0])), at)
+    misled = hidden.moved(hidden.linearised(np.array([-3.0, -8.0])), at)
     reached, converged = descend(hidden, misled, 30, at, foretold=True)
     assert converged
     assert reached.nats < 0.01

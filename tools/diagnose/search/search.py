@@ -164,19 +164,19 @@ def shared(search: EffectSearch) -> list[object]:
 
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
-    """The model with one more effect, the best of its starts. Where it ends well below what linear
-    algebra foretold, what the effect does may have driven a constant to its bound: it is fitted
-    again with all constants as they are known. Or the discrepancy may have taken the effect's part:
-    again from none. Where it ends well below the model that it holds, also from there, with
+    """The model with one more effect, the best of its starts. Where what the effect does had driven
+    a constant to its bound, one begins with all constants as they are known. Where it ends well
+    below what linear algebra foretold, the discrepancy may have taken the effect's part: it is
+    fitted again from none. Where it ends well below the model that it holds, also from there, with
     the effect's strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
-    u, fits = model.fitted.u, list[Model]()
-    for known in (u, 0.0 * u) if model.fitted.held[: u.size].any() else (u,):
-        fits += [_fitted_with(search, predicted, p.start, p.sizes, known) for p in predicted.starts]
-        made = max(fits, key=lambda m: m.evidence)
-        if made.evidence > predicted.evidence - TUNING.search.little:
-            return made
+    begins = [(one.start, one.sizes, model.fitted.u) for one in predicted.starts]
+    if model.fitted.held[: model.fitted.u.size].any():
+        begins += [(start, sizes, 0.0 * u) for start, sizes, u in begins]
+    made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
+    if made.evidence > predicted.evidence - TUNING.search.little:
+        return made
 
     again = [(predicted.starts[0].start, tuple(0 for _ in model.chosen), model.fitted.u)]
     if made.evidence <= model.evidence - TUNING.search.little:

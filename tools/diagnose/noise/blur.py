@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.noise.replicates import repeats
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -17,8 +18,8 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     axle shifts all forces by the share by which the sinkage changes within the lag. While the motor
     stands idle nothing changes, next to a start neither.
 
-    Runs that change in the same way err in the same way: as the error of one reading in each of
-    them it is so much larger that all of them tell what one does.
+    A run that is repeated errs in the same way again: as the error of one reading in each of them
+    it is so much larger that all of them tell what one does.
     """
     if stack.rig.filtered or stack.rig.tabled:
         return np.zeros(stack.size)
@@ -30,7 +31,8 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / stack.gaps
 
     bent = TUNING.noise.bend * _nearby(np.where(edge, 0.0, bend))
-    blur = np.hypot(bent, TUNING.noise.lag * _nearby(late)) * np.sqrt(len(stack.rig.runs))
+    again: Array = np.sqrt(repeats(stack))[stack.run]
+    blur = np.hypot(bent, TUNING.noise.lag * _nearby(late)) * again
     blur = np.where(stack.idle & (stack.covariate("speed") == 0.0), 0.0, blur)
     return np.hypot(blur, _of_reversal(stack, predicted))
 

@@ -68,6 +68,19 @@ def _binned(values: Array) -> Index:
     return tried[int(np.argmax([np.sum(count**2) for count in counts]))]
 
 
+def repeats(stack: Stack) -> Index:
+    """How many runs (runs,) held the same conditions as each, and as long, itself counted."""
+    label = cells(stack)
+    in_cells = label >= 0
+    held = np.zeros((len(stack.rig.runs), int(label.max(initial=-1)) + 1))
+    np.add.at(held, (stack.run[in_cells], label[in_cells]), 1.0)
+
+    together = np.minimum(held[:, None], held).sum(axis=2)
+    whole = held.sum(axis=1)
+    alike = together > TUNING.noise.mostly * np.maximum.outer(whole, whole)
+    return np.asarray((alike | np.eye(len(held), dtype=bool)).sum(axis=1))
+
+
 class HeldCondition(NamedTuple):
     """What one run did while it held a condition."""
 

@@ -84,7 +84,7 @@ def _settled(search: EffectSearch, jobs: int) -> EffectSearch:
     likely = search.sized(1)[: TUNING.search.again]
     least = likely[0].evidence - 2.0 * TUNING.search.little if likely else 0.0
     near = [model for model in likely if model.evidence > least]
-    begins = [(model, near[number == 0]) for number, model in enumerate(near) if len(near) > 1]
+    begins = [(near[0], near[1]), *((m, near[0]) for m in near[1:])] if len(near) > 1 else []
 
     def moved(pair: tuple[Model, Model]) -> Model | None:
         return attempted(lambda: _refitted(search, pair[0], pair[1].fitted.u))

@@ -38,6 +38,7 @@ CONFOUNDED: tuple[tuple[str, str, dict[str, bool | int]], ...] = (
 NEEDED: dict[str, dict[str, bool | int]] = {
     "multipass": {"second_pass": True},
     "backlash": {"reversal": True},
+    "load_axis_friction": {"staircase": False},  # it is in a load that is measured
     "contact_relaxation": {"reversal": False},  # forces that turn round would show little else
 }
 

@@ -96,16 +96,11 @@ class Objective(Protocol[Linearised, Tried]):
 
 
 def descend(
-    ground: Objective[Here, Tried],
-    start: Here,
-    rounds: int,
-    unsure: Tried | None = None,
-    foretold: bool = False,
+    ground: Objective[Here, Tried], start: Here, rounds: int, unsure: Tried | None = None
 ) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one.
 
-    unsure: where it stands, if its slopes are those of another place; foretold: whether these do
-    until a step fails.
+    unsure: where it stands, if its slopes are those of another place.
     """
     here, damping, failed = start, TUNING.numerics.damping_start, False
 
@@ -113,7 +108,7 @@ def descend(
         better = None
         while better is None and damping < 1.0 / DAMPING_LEAST:
             done = abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
-            if done and (unsure is None or foretold):
+            if done and unsure is None:
                 return here, True
             if unsure is not None and (done or failed):  # by these slopes
                 here, unsure, failed = ground.linearised(unsure), None, False
@@ -133,11 +128,11 @@ def descend(
         if better is None:
             return here, False
         # a search looks at many curved valleys: there slopes that foretold the step will do
-        foretold = bool(ground.curved.any()) and abs(share - 1.0) < 1.0 - TUNING.numerics.good
-        here, unsure = ground.moved(here, better), better
+        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
+        here, unsure = ground.moved(here, better), None if foretold else better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
-    if unsure is not None and not foretold:
+    if unsure is not None:
         here = ground.linearised(unsure)
     return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.numerics.gain
 

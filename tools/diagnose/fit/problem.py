@@ -195,8 +195,7 @@ class Problem:
         ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
         most = TUNING.numerics.rounds if rounds is None else rounds
-        begun = ground.moved(fitted, start)
-        reached, converged = descent.descend(ground, begun, most, start, foretold=True)
+        reached, converged = descent.descend(ground, ground.moved(fitted, start), most)
         return replace(reached, converged=converged)
 
 

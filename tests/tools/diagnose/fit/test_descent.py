@@ -164,14 +164,3 @@ def test_a_descent_ends_by_the_slopes_of_the_place_where_it_ends() -> None:
     reached, converged = descend(hidden, hidden.linearised(np.zeros(2)), 30)
     assert converged
     assert reached.nats < 0.01
-
-
-def test_slopes_of_another_place_do_until_a_step_fails() -> None:
-    """Then they are made anew: a descent does not end short of the optimum for the slopes it was
-    given.
-    """
-    hidden, at = _Hidden(), np.array([0.3, 0.2])
-    misled = hidden.moved(hidden.linearised(np.array([-3.0, -8.0])), at)
-    reached, converged = descend(hidden, misled, 30, at, foretold=True)
-    assert converged
-    assert reached.nats < 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from gritd.tools.diagnose.noise.blur import blur_of
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
-from tests.scenarios.commands import CONFIG, in_process
 from tests.tools.diagnose.campaigns import plan, settings
 
 
@@ -40,14 +38,3 @@ def test_steady_states_have_no_change_between_them() -> None:
     rig = replace(wheel_rig(record(plan(seconds=12.0), ()), settings()), tabled=True)
     stack = Stack(rig)
     assert not blur_of(stack, stack.measured).any()
-
-
-@pytest.mark.long
-def test_many_runs_whose_load_changes_meanwhile_give_no_alarm(tmp_path: Path) -> None:
-    """Together they are so long that a value is a mean over 0.4 s, in which the load changes."""
-    files = [str(tmp_path / f"{number}.mcap") for number in range(24)]
-    for seed, file in enumerate(files):
-        assert in_process("simulate", "--seed", str(seed), "-o", file)[0] == 0
-    code, said = in_process("diagnose", *files, *CONFIG)
-    assert code == 0
-    assert any(line.startswith("verdict: consistent") for line in said)

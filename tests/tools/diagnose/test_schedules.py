@@ -1,5 +1,5 @@
 """Schedules that `gritd prove` does not draw, with nothing left out: sweeps, many short runs, one
-long run, many long ones.
+long run, many equal ones.
 """
 
 from __future__ import annotations
@@ -56,15 +56,20 @@ def long() -> Iterator[Run]:
     yield [(round(float(rng.uniform(10.0, 40.0)), 1), *each) for each in chosen], 1.0
 
 
-def many() -> Iterator[Run]:
-    """Twenty-four equal runs in which load and slip change: values are means over 0.4 s."""
-    for _ in range(24):
-        yield [(4.5, load, slip, 0.02) for load in LOADS for slip in SLIPS], 0.5
-
-
-@pytest.mark.parametrize("runs", [of_slip, of_load, short, long, many])
+@pytest.mark.parametrize("runs", [of_slip, of_load, short, long])
 def test_no_schedule_gives_an_alarm(runs: Callable[[], Iterator[Run]], tmp_path: Path) -> None:
     files = [simulated(tmp_path, seed, *run) for seed, run in enumerate(runs())]
+    assert consistent(files)
+
+
+def test_many_equal_runs_give_no_alarm(tmp_path: Path) -> None:
+    """Together they are so long that a value is a mean over 0.4 s, in which load and slip change."""
+    files = [tmp_path / f"{seed}.mcap" for seed in range(24)]
+    for seed, file in enumerate(files):
+        assert in_process("simulate", "--seed", seed, "-o", file)[0] == 0
+    assert consistent(files)
+
+
+def consistent(files: Sequence[Path]) -> bool:
     code, said = in_process("diagnose", *files, *CONFIG)
-    assert code == 0
-    assert any(line.startswith("verdict: consistent") for line in said), said[:1]
+    return code == 0 and any(line.startswith("verdict: consistent") for line in said)

@@ -63,7 +63,7 @@ def test_no_schedule_gives_an_alarm(runs: Callable[[], Iterator[Run]], tmp_path:
 
 
 def test_many_equal_runs_give_no_alarm(tmp_path: Path) -> None:
-    """Together they are so long that a value is a mean over 0.4 s, in which load and slip change."""
+    """Together so long that a value is a mean over 0.4 s, in which load and slip change."""
     files = [tmp_path / f"{seed}.mcap" for seed in range(24)]
     for seed, file in enumerate(files):
         assert in_process("simulate", "--seed", seed, "-o", file)[0] == 0

@@ -220,6 +220,14 @@ def test_a_load_that_is_weighed_is_not_stated(tmp_path: Path) -> None:
     assert all(info.nominal_load is None for info in infos)
 
 
+def test_a_load_that_changes_within_a_run_is_weighed_too(tmp_path: Path) -> None:
+    (assignment,) = (a for a in strata.AWKWARD if a.level == "loads in a run")
+    case = cases.drawn(1, 9, assignment)
+    assert all(len({s.weight for s in run.stretches}) > 1 for run in case.trial.runs)
+    infos = [read(file).run for file in handed_over(case, tmp_path / "given")]
+    assert all(info.nominal_load is None for info in infos)
+
+
 def test_slow_noise_is_as_large_and_correlated(null: cases.BlindCase) -> None:
     (before,) = (c for c in null.trial.chain.converters if c.channel == "sinkage_pot")
     (after,) = (

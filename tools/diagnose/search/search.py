@@ -48,7 +48,7 @@ def search_models(
 
     tell = counting(step, "fitting the likely effects")
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
-    search = _settled(search)
+    search = _settled(search, jobs)
     tested: Model | None = None
     for size, (starts, most) in enumerate(TUNING.search.later, start=1):
         if begun := search.sized(size)[:starts]:
@@ -76,14 +76,35 @@ def _bare(screening: Screening, start: Model) -> Model:
     return fit_model(screening.problem, screening.forms, (), (), begins, sizes, near=start.fitted)
 
 
-def _settled(search: EffectSearch) -> EffectSearch:
-    """With the bare model fitted again from where the best effect found its constants: no model may
-    be worse than one that it holds.
+def _settled(search: EffectSearch, jobs: int) -> EffectSearch:
+    """With the bare model, and the likeliest with one effect that are nearly as likely as one
+    another, fitted again from where the best other one found its constants: no model may be worse
+    than one that it holds, and none may be likelier for where its fit began.
     """
+    likely = search.sized(1)[: TUNING.search.again]
+    least = likely[0].evidence - 2.0 * TUNING.search.little if likely else 0.0
+    near = [model for model in likely if model.evidence > least]
+    begins = [(model, near[number == 0]) for number, model in enumerate(near) if len(near) > 1]
+
+    def moved(pair: tuple[Model, Model]) -> Model | None:
+        return attempted(lambda: _refitted(search, pair[0], pair[1].fitted.u))
+
+    fits = [model for model in each(jobs, moved, begins, shared(search)) if model is not None]
+    search = replace(search, models=tuple(_the_better((*search.models, *fits))))
     again = _bare(search.screening, search.best())
     if again.evidence <= search.bare.evidence:
         return search
     return replace(search, models=(search.base, again, *search.models[2:]))
+
+
+def _refitted(search: EffectSearch, model: Model, u: Array) -> Model:
+    """The same model from other constants u (q,)."""
+    fitted, screening = model.fitted, search.screening
+    begins, errors = (u, fitted.x), model.other_forms
+    return fit_model(
+        screening.problem, screening.forms, fitted.effects, fitted.free, begins, model.sizes,
+        errors, fitted,
+    )  # fmt: skip
 
 
 # ---- one more effect ---------------------------------------------------------------------------

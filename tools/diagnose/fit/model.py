@@ -141,7 +141,8 @@ def fit_model(
     near: Fitted | None = None,
 ) -> Model:
     """Fit and sizes in turns, until the sizes stay and linear algebra has little to add, a few
-    rounds at most.
+    rounds at most. Of a turn counts what its fit reached, and not what other sizes promise there;
+    one that ends well below the one before is the last, and does not count.
 
     Every fit has the terms of its effects too, as far as they are known when it begins. Without
     the other forms that these need, it would strain the constants, to where linear algebra tells
@@ -160,7 +161,7 @@ def fit_model(
     fitted = problem.with_terms(every, _values(every, sizes)).descend(
         effects, free, *start, near=near
     )
-    made = fitted
+    made, best = fitted, None
     for number in range(TUNING.numerics.size_rounds):
         known = every
         begun = number < TUNING.numerics.form_rounds
@@ -171,15 +172,24 @@ def fit_model(
 
         beyond = marginal.gain(of_fit)
         sizes, evidence = marginal.likeliest(of_fit)
-        done = beyond < TUNING.fit.last_step
-        if (done and sizes == of_fit) or number + 1 == TUNING.numerics.size_rounds:
+        reached = (evidence if sizes == of_fit else marginal.log_evidence(of_fit)) - beyond
+        if best is not None and reached < best.evidence - TUNING.search.little:
             break
-        fitted = problem.with_terms(every, _values(every, sizes)).refit(fitted)
+        best = _model(fitted, reached, marginal, of_fit, len(forms))
+        if beyond < TUNING.fit.last_step and sizes == of_fit:
+            break
+        if number + 1 < TUNING.numerics.size_rounds:
+            fitted = problem.with_terms(every, _values(every, sizes)).refit(fitted)
 
+    assert best is not None
+    return best
+
+
+def _model(fitted: Fitted, evidence: float, marginal: Marginal, sizes: Chosen, forms: int) -> Model:
+    """sizes: of every term in the fit, first so many of the model's form."""
     names = tuple(effect.name for effect in fitted.acting)
-    of_forms, of_form_errors = of_fit[: len(forms)], of_fit[len(forms) :]
-    form_sizes = tuple(_values(every[len(forms) :], of_form_errors))
-    return Model(fitted, names, evidence - beyond, of_forms, form_sizes, marginal, of_fit)
+    form_sizes = tuple(_values(marginal.terms[forms:], sizes[forms:]))
+    return Model(fitted, names, evidence, sizes[:forms], form_sizes, marginal, sizes)
 
 
 def _without_form_errors(fitted: Fitted, terms: Sequence[RandomEffect]) -> bool:

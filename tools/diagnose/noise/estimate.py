@@ -249,8 +249,7 @@ def _colour_of(
     columns = np.column_stack((mean, residual[own]))
 
     tried = tried or colours()
-    gram, log_det = products_of_innovations(columns, stack.gaps_of(own), tried)
-    likelihood, variance = restricted(gram, log_det, len(columns))
+    likelihood, variance = _likelihoods(columns, stack.gaps_of(own), tried)
     posterior = likelihood + log_prior(tried, stack.gaps)
     weight = np.exp(posterior - posterior.max())
 
@@ -260,6 +259,19 @@ def _colour_of(
         for c, v in zip(tried, variance, strict=True)
     ]
     return _careful(sized, weight / weight.sum(), step_of(stack.gaps))
+
+
+def _likelihoods(columns: Array, gaps: Array, tried: Sequence[Colour]) -> tuple[Array, Array]:
+    """See `restricted`; columns (n, m + 1), the values last. A few colours at a time: the products
+    take memory.
+    """
+    few = TUNING.numerics.colours_at_once
+    parts = [
+        restricted(*products_of_innovations(columns, gaps, tried[i : i + few]), len(columns))
+        for i in range(0, len(tried), few)
+    ]
+    likelihood, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return likelihood, variance
 
 
 def colours() -> list[Colour]:

@@ -54,6 +54,7 @@ class Numerics:
 
     # --- held at once ---
     whitened_at_once: int = 4_000_000  # numbers, for memory
+    colours_at_once: int = 16  # products of a channel's columns in noise of each, for memory
     at_once: int = 12  # signatures whitened and projected, or weighed, for memory
     most_samples: int = 1_500_000  # of a channel in all runs, for memory
     kept: int = 8  # simulations of all runs, for memory and run time

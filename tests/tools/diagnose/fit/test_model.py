@@ -95,6 +95,7 @@ def test_the_evidence_counts_no_more_than_the_fit_reached(rounds: int) -> None:
         model = fit_model(base.problem, forms, (PEAK,), free, begins, sizes)
     assert model.marginal is not None
     promised = model.marginal.gain(model.chosen)
-    assert model.evidence == pytest.approx(model.marginal.likeliest(model.chosen)[1] - promised)
+    reached = model.marginal.log_evidence(model.chosen) - promised
+    assert reached <= model.evidence <= model.marginal.likeliest(model.chosen)[1] - promised
     assert model.fitted.converged == (rounds == 30)
     assert (promised > 1.0) == (rounds < 30)

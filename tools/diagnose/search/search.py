@@ -77,34 +77,37 @@ def _bare(screening: Screening, start: Model) -> Model:
 
 
 def _settled(search: EffectSearch, jobs: int) -> EffectSearch:
-    """With the bare model, and the likeliest with one effect that are nearly as likely as one
-    another, fitted again from where the best other one found its constants: no model may be worse
-    than one that it holds, and none may be likelier for where its fit began.
+    """With fits of one effect from each other's constants, and the bare model from those of the
+    best: no model may be worse than one that it holds.
     """
-    likely = search.sized(1)[: TUNING.search.again]
-    least = likely[0].evidence - 2.0 * TUNING.search.little if likely else 0.0
-    near = [model for model in likely if model.evidence > least]
-    begins = [(model, near[number == 0]) for number, model in enumerate(near) if len(near) > 1]
-
-    def moved(pair: tuple[Model, Model]) -> Model | None:
-        return attempted(lambda: _refitted(search, pair[0], pair[1].fitted.u))
-
-    fits = [model for model in each(jobs, moved, begins, shared(search)) if model is not None]
-    search = replace(search, models=tuple(_the_better((*search.models, *fits))))
+    search = _from_each_other(search, jobs)
     again = _bare(search.screening, search.best())
     if again.evidence <= search.bare.evidence:
         return search
     return replace(search, models=(search.base, again, *search.models[2:]))
 
 
-def _refitted(search: EffectSearch, model: Model, u: Array) -> Model:
-    """The same model from other constants u (q,)."""
-    fitted, screening = model.fitted, search.screening
-    begins, errors = (u, fitted.x), model.other_forms
-    return fit_model(
-        screening.problem, screening.forms, fitted.effects, fitted.free, begins, model.sizes,
-        errors, fitted,
-    )  # fmt: skip
+def _from_each_other(search: EffectSearch, jobs: int) -> EffectSearch:
+    """With the models of one effect that are nearly as likely as the best, each fitted again from
+    the constants of the likeliest other: none may be likelier for where its fit began.
+    """
+    likely = search.sized(1)[: TUNING.search.again]
+    alike = [m for m in likely if m.evidence > likely[0].evidence - 2.0 * TUNING.search.little]
+    if len(alike) < 2:
+        return search
+    first, second, *_ = alike
+    begins = [(first, second), *((model, first) for model in alike[1:])]
+
+    def again(model: Model, other: Model) -> Model:
+        begun, near = (other.fitted.u, model.fitted.x), model.fitted
+        return fit_model(
+            search.problem, search.screening.forms, near.effects, near.free, begun, model.sizes,
+            model.other_forms, near,
+        )  # fmt: skip
+
+    made = each(jobs, lambda pair: attempted(lambda: again(*pair)), begins, shared(search))
+    fits = [model for model in made if model is not None]
+    return replace(search, models=tuple(_the_better((*search.models, *fits))))
 
 
 # ---- one more effect ---------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.search.search import (
     _fitted_with,
     _free_near,
+    _from_each_other,
     _retested,
     _with_effect,
     begin,
@@ -151,6 +152,18 @@ def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
     again = next(m for m in free.models if m.names == one.names)
     assert again.evidence == pytest.approx(one.evidence, abs=0.5)
     assert free.best() is again
+
+
+def test_what_is_nearly_as_likely_is_fitted_from_where_the_other_stands() -> None:
+    """A fit of one effect that got stuck a little below another's is made again from there."""
+    search = searched(make("bulldozing", {"share": 0.75}))
+    (one,) = extended(search, [search.bare], 1, 1).models[2:]
+    other = replace(one, names=("viscous_friction",))
+    stuck = replace(one, evidence=one.evidence - TUNING.search.little)
+    caught = replace(search, models=(search.base, search.bare, other, stuck))
+
+    again = next(m for m in _from_each_other(caught, 1).models if m.names == one.names)
+    assert again.evidence == pytest.approx(one.evidence, abs=0.5)
 
 
 @dataclass(frozen=True)

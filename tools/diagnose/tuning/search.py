@@ -23,14 +23,18 @@ class SearchTuning:
         3, "pairs", "of effects that are likeliest together by linear algebra, fitted", "run time"
     )
     again: int = tuned(
-        4, "shapes", "of one effect or family tried again, or as starts: the likeliest", "run time"
+        4,
+        "shapes",
+        "of one effect or family, or effects, tried again, or as starts: the likeliest",
+        "run time",
     )
     little: float = tuned(
         8.0,
         "nats",
         "that decide little: a third of what the verdict asks of one more effect. A model so far "
         "behind starts nothing, an effect that promises less is not fitted beside others, a fit so "
-        "far below the model that it holds begins anew",
+        "far below the model that it holds begins anew. Effects closer than twice it are fitted "
+        "from each other's constants",
         "run time",
     )
     predicted_share: float = tuned(

@@ -177,14 +177,13 @@ def _few(path: Path, rows: Iterable[Row], columns: int) -> Iterator[Row]:
         yield row
 
 
-def numbers(path: Path, table: Table, name: str) -> Array:
-    """One column as finite numbers, shape (n,). Raises RigFileError naming the row."""
-    return np.array(
-        [
-            finite_number(path, f"row {row}: {name}", text)
-            for row, text in enumerate(table[name], start=2)
-        ]
-    )
+def numbers(path: Path, table: Table, name: str, rows: Sequence[int] = ()) -> Array:
+    """One column as finite numbers, shape (n,). rows: their numbers in the file; from 2 on where
+    none are given. Raises RigFileError naming the row.
+    """
+    texts = table[name]
+    numbered = zip(rows or range(2, len(texts) + 2), texts, strict=True)
+    return np.array([finite_number(path, f"row {row}: {name}", text) for row, text in numbered])
 
 
 def finite_number(path: Path, where: str, text: str) -> float:

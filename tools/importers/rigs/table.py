@@ -40,7 +40,8 @@ SUMMARY = (
 CSV = re.compile(r".*\.csv(?:\.gz)?")
 CONSTANTS = ("source", "wheel_radius_m", "wheel_width_m", "soil_simulant", "soil_shear_modulus_k_m")
 MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m")
-TORQUE = "meas_torque_nm"  # a table may lack it
+LUGS = ("grouser_height_m", "grouser_count")  # a table may lack them
+TORQUE = "meas_torque_nm"  # a table, or one wheel of it, may lack it
 # channel -> unit, column, and how well a value is read from a printed figure
 MEASURED_ERRORS = {
     "drawbar-pull": ("N", "meas_drawbar_pull_n", 0.5),
@@ -121,8 +122,8 @@ def _has(path: Path, column: str) -> bool:
 
 
 def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell) -> list[Path]:
-    torque = [TORQUE] if _has(path, TORQUE) else []
-    whole = read_table(path, [*CONSTANTS, *MEASURED, *torque])
+    further = [name for name in (*LUGS, TORQUE) if _has(path, name)]
+    whole = read_table(path, [*CONSTANTS, *MEASURED, *further])
     check_few(path, len(whole[MEASURED[0]]))
     stem = path.name.partition(".")[0]
 
@@ -136,17 +137,23 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
 
 
 def _groups(table: Table) -> Iterator[tuple[list[int], Table]]:
-    """The rows of each wheel on each soil with their numbers in the file, in the file's order."""
-    keys = list(zip(*(table[name] for name in CONSTANTS), strict=True))
+    """The rows of each wheel on each soil with their numbers in the file, in the file's order. A
+    wheel of other lugs is another wheel.
+    """
+    constants = [name for name in (*CONSTANTS, *LUGS) if name in table]
+    keys = list(zip(*(table[name] for name in constants), strict=True))
     for key in dict.fromkeys(keys):
         chosen = [at for at, each in enumerate(keys) if each == key]
         rows = {name: [column[at] for at in chosen] for name, column in table.items()}
+        if not any(rows.get(TORQUE, ())):
+            rows.pop(TORQUE, None)
         yield [at + 2 for at in chosen], rows
 
 
 def _in_two_lines(name: str, table: Table, sigma: Mapping[str, float]) -> str:
     """A group, and the errors its values are taken to have, in two lines."""
     loads = np.array([float(text) for text in table["vertical_load_n"]])
+    lugs = "".join(f", {name} {table[name][0]}" for name in LUGS if name in table)
     without = "" if TORQUE in table else ", no torque"
 
     units = {channel: unit for channel, (unit, _, _) in MEASURED_ERRORS.items()}
@@ -158,7 +165,7 @@ def _in_two_lines(name: str, table: Table, sigma: Mapping[str, float]) -> str:
 
     return (
         f"{name}: {loads.size} steady states, mean load {loads.mean():.1f} N, radius "
-        f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{without}\n"
+        f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{lugs}{without}\n"
         f"{name}: taken as uncertain by {taken}"
     )
 
@@ -186,8 +193,9 @@ def _import_group(
 def _conditions(
     path: Path, rows: list[int], table: Table, args: argparse.Namespace
 ) -> list[Condition]:
-    columns = [numbers(path, table, name).tolist() for name in MEASURED]
-    torques = numbers(path, table, TORQUE).tolist() if TORQUE in table else [None] * len(rows)
+    columns = [numbers(path, table, name, rows).tolist() for name in MEASURED]
+    has = TORQUE in table
+    torques = numbers(path, table, TORQUE, rows).tolist() if has else [None] * len(rows)
     sigma, conditions = errors(table, args), []
 
     for row, load, slip, pull, sinkage, torque in zip(rows, *columns, torques, strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.commands.import_rig import main
+from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.rigs.table import load_scatter, repeat_scatter
 from tests.real_recordings import REAL, Physical, needs
 
@@ -88,6 +89,36 @@ def test_several_wheels_and_soils_without_torque(
         known[path.stem] = (trial.settings.wheel.radius, soil.exponent.value)
         assert not trial.recording.counts["/raw/motor_shunt"]
     assert known == {"many-1": (0.1, 1.1), "many-2": (0.15, 1.1), "many-3": (0.1, 0.7)}
+
+
+def test_a_wheel_with_other_lugs_is_another_wheel_and_may_have_no_torque(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As tables of several laboratories have it: one of the wheels was driven without torque."""
+    lugs = ((0.0, 0, "2.0"), (0.01, 16, "3.0"), (0.02, 14, ""))
+    rows = [
+        f"{row},{height},{number},{torque}"
+        for height, number, torque in lugs
+        for row in rows_of(0.1, "sand")
+    ]
+    header = f"{HEADER},grouser_height_m,grouser_count,meas_torque_nm"
+    (tmp_path / "many.csv").write_text("\n".join([header, *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+    assert "grouser_count 14, no torque" in capsys.readouterr().out
+    trials = [Physical(tmp_path / "out" / f"many-{number}.mcap") for number in (1, 2, 3)]
+    torques = [t.recording.counts["/raw/motor_shunt"] for t in trials]
+    assert torques[0] and torques[1] and not torques[2]
+    assert trials[1].value("motor_shunt").mean() == pytest.approx(3.0)
+
+
+def test_a_torque_that_one_row_lacks_is_told_by_its_row(tmp_path: Path) -> None:
+    rows = [*rows_of(0.1, "clay", ",2.0"), *rows_of(0.1, "sand", ",2.0")]
+    rows[4] = rows[4].removesuffix("2.0")
+    (tmp_path / "many.csv").write_text("\n".join([f"{HEADER},meas_torque_nm", *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    with pytest.raises(RigFileError, match="row 6: meas_torque_nm"):
+        main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
 
 
 def test_loads_that_were_meant_to_be_one_do_not_differ_by_more_than_their_scatter(

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from gritd.estimator.config.settings import Settings
@@ -164,7 +164,8 @@ def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
     torque, angle = motion.compared(motion.torque), motion.compared(motion.angle)
     velocity = motion.compared(motion.velocity)
     still = TUNING.rig.creep * usual
-    fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
+    moves = maximum_filter1d(np.abs(motion.velocity), motion.every // 2 + 1)
+    slowest = minimum_filter1d(moves, 2 * motion.every + 1)[motion.kept]
 
     covariates = {
         "speed": np.abs(velocity),
@@ -181,7 +182,7 @@ def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
         name,
         motion.time[motion.kept],
         {"torque": torque},
-        {"torque": fastest > still},
+        {"torque": slowest > still},
         covariates,
         np.zeros(velocity.size),
         np.zeros(velocity.size),

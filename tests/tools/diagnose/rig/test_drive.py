@@ -47,6 +47,32 @@ def test_reversals_count_but_a_drive_at_rest_does_not() -> None:
     assert not counted[run.time > 13.0].any()
 
 
+def test_a_drive_that_sticks_is_judged_where_it_turns() -> None:
+    """At every turning point it holds for a second, and its current creeps from one side of the
+    friction to the other: how, no law tells.
+    """
+    pause, step = 1.0, 1e-3
+    swings = [0.3 * np.cos(np.pi * np.arange(0.0, 1.0, step) + k * np.pi) for k in range(12)]
+    holds = round(pause / step)
+    position = np.concatenate([np.append(one, np.full(holds, one[-1])) for one in swings])
+    speed = np.gradient(position, step)
+    away = np.sign(np.concatenate([np.full(len(one) + holds, one[-1] - one[0]) for one in swings]))
+    held = np.tile(np.append(np.zeros(len(swings[0])), np.linspace(0.0, 1.0, holds)), len(swings))
+    noise = np.random.default_rng(4).standard_normal((2, position.size))
+    time = step * np.arange(position.size)
+    moves = INERTIA * np.gradient(speed, step) + DAMPING * speed + LOSS * away
+    force = np.where(held > 0.0, LOSS * away * (1.0 - 2.0 * held), moves)
+    series = {
+        "wheel_encoder": (time, position + 1e-7 * noise[0]),
+        "motor_shunt": (time, force + 0.3 * noise[1]),
+    }
+    found = diagnose(rig(series))
+    values = {h.effect: h.parameters for h in found.hypotheses if h.accepted}
+    assert set(values) == {"coulomb_friction"}
+    loss = values["coulomb_friction"]["loss"]
+    assert abs(loss.value - LOSS) < 2.0 * loss.sigma < LOSS
+
+
 def test_what_both_sides_are_filtered_by_blurs_neither() -> None:
     stack = Stack(rig(log()))
     assert not blur_of(stack, stack.measured).any()

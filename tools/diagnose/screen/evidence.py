@@ -17,7 +17,6 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
@@ -186,8 +185,6 @@ def _varied(problem: Problem, gram: Gram, one: Weighed) -> list[Weighed]:
         sign = (*made.sign, *(0 for _ in along))
 
         bayes = prior + log_bayes(own, right, sign)
-        if made.sign[number]:
-            bayes += _positive_everywhere(own, right, number, count)
         each_size = gram.evidence + bayes
         best = int(np.argmax(each_size))
         amplitude = _amplitude(own[best], right[best])
@@ -200,18 +197,6 @@ def _varied(problem: Problem, gram: Gram, one: Weighed) -> list[Weighed]:
         start = _start(effect, made, amplitude)
         out.append(Weighed(made, total, exact, start, gram.sizes[best].chosen))
     return out
-
-
-def _positive_everywhere(a: Array, b: Array, number: int, count: int) -> Array:
-    """ln of the posterior share (s,) in which a positive strength is larger than it varies along
-    the bed: A (s, p, p), b (s, p) of so many strengths and then of the waves of one.
-    """
-    precision = a + np.eye(b.shape[1])
-    amplitude = np.linalg.solve(precision, b[:, :, None])[:, :, 0]
-    sigma = np.sqrt(np.linalg.inv(precision)[:, number, number])
-    mean = amplitude[:, number] / sigma
-    varies = TUNING.fit.place_sizes[-1] * np.sqrt(np.mean(amplitude[:, count:] ** 2, axis=1))
-    return np.asarray(log_ndtr(mean - varies / sigma) - log_ndtr(mean))
 
 
 def every_shape(problem: Problem, model: Model) -> Shapes:

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
-from tests.tools.diagnose.unlisted import BentRail, CableChainDrag
+from tests.tools.diagnose.unlisted import BentRail, CableChainDrag, NextDoor
 
 
 def frees_the_soil(found: Diagnosis) -> bool:
@@ -86,6 +86,19 @@ def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableChainDr
     found = diagnosed(plan(), (stranger,))
     assert found.verdict == "unlisted", found.summary
     assert max(h.probability for h in found.hypotheses) <= 0.5
+
+
+@pytest.mark.parametrize("stranger", [CableChainDrag(size=20.0), NextDoor(size=10.0)])
+def test_a_friction_is_named_beside_a_larger_stranger_elsewhere(
+    stranger: CableChainDrag | NextDoor,
+) -> None:
+    """What pulls at the carriage is nothing against a loss that takes all that is wrong with the
+    torque.
+    """
+    found = diagnosed(plan(), (make("coulomb_friction", {"loss": 0.06}), stranger))
+    assert "coulomb_friction" in group(found), found.summary
+    assert len([h for h in found.hypotheses if h.accepted]) == 1
+    assert found.remaining_words
 
 
 def test_no_force_sensor_degrades_honestly() -> None:

@@ -216,20 +216,24 @@ def does(fitted: Fitted) -> dict[str, float]:
     return {n: float(np.linalg.norm(done[:, strengths & (of == n)].sum(axis=1))) for n in names}
 
 
+def squares(stack: Stack, model: Model) -> Array:
+    """Of each effect of a model what it does (k, channels), whitened and squared."""
+    fitted = model.fitted
+    done = (fitted.own[:, len(fitted.u) :] * fitted.x) ** 2
+    shown = stack.by_channel(done)
+    of = np.array([f.name for f in fitted.free])
+    return np.array([shown[:, of == name].sum(axis=1) for name in model.names])
+
+
 def in_one_place(stack: Stack, model: Model) -> float:
     """How many of a model's effects act in the channels where others act, but one: each by the
     share that its squares have in common with those of the rest.
     """
     if len(model.names) < 2:
         return 0.0
-    fitted = model.fitted
-    done = (fitted.own[:, len(fitted.u) :] * fitted.x) ** 2
-    shown = np.array([stack.of(channel) for channel in stack.rig.channels], float) @ done
-    of = np.array([f.name for f in fitted.free])
-    squares = np.array([shown[:, of == name].sum(axis=1) for name in model.names])
-
-    rest = squares.sum(axis=0) - squares
-    own, rest = (s / np.maximum(s.sum(axis=1, keepdims=True), SPAN) for s in (squares, rest))
+    done = squares(stack, model)
+    rest = done.sum(axis=0) - done
+    own, rest = (s / np.maximum(s.sum(axis=1, keepdims=True), SPAN) for s in (done, rest))
     common = np.minimum(own, rest).sum(axis=1)
     return float(common.sum() - common.max())
 

@@ -138,6 +138,11 @@ class Stack:
             out[place[name]] = place[whole], marked
         return out
 
+    def by_channel(self, values: Array) -> Array:
+        """Sums over the values (N, …) of each channel (channels, …)."""
+        marks = np.array([self.of(channel) for channel in self.rig.channels], float)
+        return np.asarray(marks @ values)
+
     def of(self, channel: str) -> Bools:
         """Marks the values of a channel (N,), which the rig may not have."""
         channels = self.rig.channels

@@ -15,11 +15,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.estimator.effects import EFFECTS
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.evidence import log_bayes_expected
 from gritd.tools.diagnose.fit.heldout import missed
-from gritd.tools.diagnose.fit.model import Model, in_one_place
+from gritd.tools.diagnose.fit.model import Model, in_one_place, squares
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screening import Screen
 from gritd.tools.diagnose.search.calibration import OddsCalibration
@@ -191,10 +192,12 @@ def trusting(
     """
     rig, made = search.problem.stack.rig, []
     for w in weighed:
-        share = taken_share(search, w.model) if w.names else 0.0
-        trust = trusted(rig, w.model, share, by)
-        common = in_one_place(search.problem.stack, w.model)
-        made.append(replace(w, common=common, share=share, trust=trust))
+        if w.names:
+            share, where_it_acts = _taken(search, w.model)
+            common = in_one_place(search.problem.stack, w.model)
+            trust = trusted(rig, w.model, where_it_acts.tolist(), by)
+            w = replace(w, common=common, share=share, trust=trust)
+        made.append(w)
     return made
 
 
@@ -260,15 +263,31 @@ def taken_share(search: EffectSearch, model: Model) -> float:
     leaves when its effects are switched off and all else stays. Other forms of an effect do not
     count, but for profiles: how it goes along what no law tells of.
     """
-    fitted = model.fitted
+    return _share(*_misfits(search, model).sum(axis=1))
+
+
+def _taken(search: EffectSearch, model: Model) -> tuple[float, Array]:
+    """The same, and for each effect (k,) the share that is taken of the misfit where it acts: the
+    mean over channels, by what it does in each.
+    """
+    misfits, done = _misfits(search, model), squares(search.problem.stack, model)
+    each = np.array([_share(before, after) for before, after in misfits.T])
+    where_it_acts = done @ each / np.maximum(done.sum(axis=1), SPAN)
+    return _share(*misfits.sum(axis=1)), where_it_acts
+
+
+def _misfits(search: EffectSearch, model: Model) -> Array:
+    """Squares beyond noise without a model's effects, and with them (2, channels)."""
+    fitted, stack = model.fitted, search.problem.stack
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
-
     shared = np.zeros(fitted.residual.size)
-    if search.problem.stack.referred:  # what both campaigns do is no misfit
+    if stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
+    left = (off.residual - shared, fitted.residual - shared - model.profiles()[1])
+    return np.array([stack.by_channel(r**2 - 1.0) for r in left])
 
-    left = [off.residual - shared, fitted.residual - shared - model.profiles()[1]]
-    before, after = (float(r @ r) - r.size for r in left)
+
+def _share(before: float, after: float) -> float:
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 
 

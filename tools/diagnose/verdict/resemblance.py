@@ -4,8 +4,8 @@ Either may have been there: the effect in some published form, or other physics 
 be bent to. Both explain the recordings by the same functions, so at any form error h, the share by
 which the formula is bent, their likelihood L(h) is one. They differ by what is expected. Published
 laws of an effect differ little, so its prior over h has hardly anything at the last size; what only
-resembles it mostly needs that. What is there takes nearly all of the misfit, what resembles it a
-lesser share s. With the share λ of explanations that mislead (calibration.py)
+resembles it mostly needs that. What is there takes nearly all of the misfit where it acts, what
+resembles it a lesser share s. With the share λ of explanations that mislead (calibration.py)
 
     P(effect) = Σ L(h) (1 − λ) p(h, s | effect) / Σ L(h) [(that) + λ p(h, s | other)]
 
@@ -17,6 +17,8 @@ are lower: of what only resembles it that is oftener so.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -32,13 +34,15 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
 
-def trusted(rig: Rig, model: Model, share: float, by: OddsCalibration) -> tuple[float, ...]:
+def trusted(
+    rig: Rig, model: Model, shares: Sequence[float], by: OddsCalibration
+) -> tuple[float, ...]:
     """Of each effect of a model, the probability that it is there, if the model is the best
-    explanation and takes such a share of the misfit.
+    explanation. shares: of the misfit where it acts, that are taken.
     """
     return tuple(
         believed(_of_law(rig, model, name), _of_place(model, name), share, by.lapse)
-        for name in model.names
+        for name, share in zip(model.names, shares, strict=True)
     )
 
 

@@ -193,9 +193,9 @@ def trusting(
     rig, made = search.problem.stack.rig, []
     for w in weighed:
         if w.names:
-            share, where_it_acts = _taken(search, w.model)
+            share, shares = _taken(search, w.model)
             common = in_one_place(search.problem.stack, w.model)
-            trust = trusted(rig, w.model, where_it_acts.tolist(), by)
+            trust = trusted(rig, w.model, shares.tolist(), by)
             w = replace(w, common=common, share=share, trust=trust)
         made.append(w)
     return made
@@ -267,13 +267,15 @@ def taken_share(search: EffectSearch, model: Model) -> float:
 
 
 def _taken(search: EffectSearch, model: Model) -> tuple[float, Array]:
-    """The same, and for each effect (k,) the share that is taken of the misfit where it acts: the
-    mean over channels, by what it does in each.
+    """The same, and for each effect (k,) that or the share which is taken of the misfit where it
+    acts, if that is larger: the mean over channels, by what it does in each. What is wrong with
+    another channel tells nothing against an effect.
     """
     misfits, done = _misfits(search, model), squares(search.problem.stack, model)
+    share = _share(*misfits.sum(axis=1))
     each = np.array([_share(before, after) for before, after in misfits.T])
     where_it_acts = done @ each / np.maximum(done.sum(axis=1), SPAN)
-    return _share(*misfits.sum(axis=1)), where_it_acts
+    return share, np.maximum(where_it_acts, share)
 
 
 def _misfits(search: EffectSearch, model: Model) -> Array:

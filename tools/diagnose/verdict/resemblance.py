@@ -38,7 +38,7 @@ def trusted(
     rig: Rig, model: Model, shares: Sequence[float], by: OddsCalibration
 ) -> tuple[float, ...]:
     """Of each effect of a model, the probability that it is there, if the model is the best
-    explanation. shares: of the misfit where it acts, that are taken.
+    explanation. shares: of the misfit, or of that where it acts, which are taken.
     """
     return tuple(
         believed(_of_law(rig, model, name), _of_place(model, name), share, by.lapse)

@@ -164,6 +164,7 @@ def _run(motion: DriveMotion, name: str, usual: float) -> GridRun:
     torque, angle = motion.compared(motion.torque), motion.compared(motion.angle)
     velocity = motion.compared(motion.velocity)
     still = TUNING.rig.creep * usual
+    # what holds a drive at rest, half an interval or longer, no law tells; nor what is near it
     moves = maximum_filter1d(np.abs(motion.velocity), motion.every // 2 + 1)
     slowest = minimum_filter1d(moves, 2 * motion.every + 1)[motion.kept]
 

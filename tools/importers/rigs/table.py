@@ -145,7 +145,7 @@ def _groups(table: Table) -> Iterator[tuple[list[int], Table]]:
     for key in dict.fromkeys(keys):
         chosen = [at for at, each in enumerate(keys) if each == key]
         rows = {name: [column[at] for at in chosen] for name, column in table.items()}
-        if not any(rows.get(TORQUE, ())):
+        if not any(map(str.strip, rows.get(TORQUE, ()))):
             rows.pop(TORQUE, None)
         yield [at + 2 for at in chosen], rows
 

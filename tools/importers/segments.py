@@ -2,10 +2,10 @@
 between segments.
 
 A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of
-a normal distribution, a tenth of a second each, in an order that differs by channel, segment and
-run: the segment has mean and deviation exactly, and its mean is as uncertain as that of
-INDEPENDENT readings. Did they change faster, all scatter would average out, and a comparison would
-take the mean for exact.
+a normal distribution, a tenth of a second each, in an order that differs by channel: the segment
+has mean and deviation exactly, and its mean is as uncertain as that of INDEPENDENT readings. Did
+they change faster, all scatter would average out, and a comparison would take the mean for exact.
+The order is the same in every segment and recording, so nothing hangs on it.
 """
 
 from __future__ import annotations
@@ -70,11 +70,9 @@ def scatter_of_mean(value: float, sigma: float) -> Uncertain:
     return Uncertain(value, sigma * INDEPENDENT**0.5)
 
 
-def streams(
-    conditions: Sequence[Condition], counting: Counting, *run: int
-) -> list[ChannelReadings]:
-    """The segments one after the other, as the channels of a recording. Scatter has another order
-    in every run.
+def streams(conditions: Sequence[Condition], counting: Counting) -> list[ChannelReadings]:
+    """The segments one after the other, as the channels of a recording. The encoders speak a pause
+    earlier and later than all else, so that the first and the last readings have a speed too.
     """
     seconds = np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
@@ -82,47 +80,48 @@ def streams(
         [stamps(START, seconds + spacing * number) for number in range(len(conditions))]
     )
 
-    sinkage = _all([c.sinkage for c in conditions], *run, 3)
+    pause = round(PAUSE * NS)
+    beats = np.concatenate(([times[0] - pause], times, [times[-1] + pause]))
+    rim = _travel([c.rim_speed for c in conditions], counting.rim)
+    carriage = _travel([c.carriage_speed for c in conditions], counting.carriage)
+
+    sinkage = _all([c.sinkage for c in conditions], 3)
     sensors = [
-        ChannelReadings(
-            "wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)
-        ),
-        ChannelReadings(
-            "carriage_encoder",
-            times,
-            _travel([c.carriage_speed for c in conditions], counting.carriage),
-        ),
+        ChannelReadings("wheel_encoder", beats, rim),
+        ChannelReadings("carriage_encoder", beats, carriage),
         ChannelReadings("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
 
     if any(c.current is not None for c in conditions):
         sensors.append(
-            ChannelReadings("motor_shunt", times, _all([c.current for c in conditions], *run, 4))
+            ChannelReadings("motor_shunt", times, _all([c.current for c in conditions], 4))
         )
 
     axes = np.zeros((len(times), 6))
-    axes[:, 0] = _all([c.drawbar_pull for c in conditions], *run, 0)
-    axes[:, 1] = _all([c.lateral_force for c in conditions], *run, 1)
-    axes[:, 2] = _all([c.load for c in conditions], *run, 2)
+    axes[:, 0] = _all([c.drawbar_pull for c in conditions], 0)
+    axes[:, 1] = _all([c.lateral_force for c in conditions], 1)
+    axes[:, 2] = _all([c.load for c in conditions], 2)
 
     return [*sensors, ChannelReadings("wrench", times, axes)]
 
 
 def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
-    """Counts at constant speed within each segment, standing still in the silences."""
+    """Counts at constant speed within each segment, standing still in the silences, before the
+    first and after the last.
+    """
     seconds = np.arange(1, round(RATE * DURATION) + 1) / RATE
     begins = np.concatenate(([0.0], np.cumsum(speeds)[:-1])) * DURATION
     travel = begins[:, None] + np.asarray(speeds)[:, None] * seconds
-    return np.asarray(np.round(travel.ravel() / per_count), dtype=np.int64)
+    whole = np.concatenate(([0.0], travel.ravel(), travel[-1:, -1]))
+    return np.asarray(np.round(whole / per_count), dtype=np.int64)
 
 
-def _all(values: Sequence[Uncertain | None], *seed: int) -> Array:
-    """One array of mean ± standard deviation, segment by segment; 0 where nothing was measured."""
-    order = np.random.default_rng(seed)
-    normal_scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
-    normal_scores /= normal_scores.std()
-    length = round(RATE * DURATION / INDEPENDENT)
+def _all(values: Sequence[Uncertain | None], channel: int) -> Array:
+    """One array of mean ± standard deviation, segment by segment; 0 where nothing was measured.
+    channel: its number, which orders the scatter.
+    """
+    scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
+    order = np.random.default_rng(channel).permutation(scores / scores.std())
+    scatter = np.repeat(order, round(RATE * DURATION / INDEPENDENT))
     known = [value or Uncertain(0.0) for value in values]
-    return np.concatenate(
-        [v.value + v.sigma * np.repeat(order.permutation(normal_scores), length) for v in known]
-    )
+    return np.concatenate([v.value + v.sigma * scatter for v in known])

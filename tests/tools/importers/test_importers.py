@@ -202,9 +202,10 @@ def test_a_table_drives_and_brakes(tmp_path: Path) -> None:
     wheel = rows.arrays("/raw/wheel_encoder")["count"] * scale * settings_.wheel.radius
     carriage = rows.arrays("/raw/carriage_encoder")["count"] * 1e-6
 
-    assert len(wheel) == 1200
+    assert len(wheel) == 1202  # the first and the last while it stands
+    assert wheel[0] == 0.0 and wheel[-1] == wheel[-2]
 
-    for segment, speeds in ((slice(0, 600), (0.02, 0.016)), (slice(600, 1200), (0.014, 0.02))):
+    for segment, speeds in ((slice(1, 601), (0.02, 0.016)), (slice(601, 1201), (0.014, 0.02))):
         travelled = (np.ptp(wheel[segment]), np.ptp(carriage[segment]))
         assert travelled == pytest.approx(tuple(speed * 5.99 for speed in speeds), abs=3e-6)
 

@@ -176,7 +176,7 @@ def _import_table(
             notes=f"{wheel} wheel; a steady state",
             steady_states=True,
         )
-        made = streams([condition], COUNTING, round(speed), repeat)
+        made = streams([condition], COUNTING)
         written.append(write(output / f"{wheel}-table" / f"{name}.mcap", made, configured, info))
 
     return written

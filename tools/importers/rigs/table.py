@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import math
 import re
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -185,7 +184,7 @@ def _import_group(
     load = float(np.mean([condition.load.value for condition in conditions]))
     notes = f"{len(conditions)} steady states from a table"
     info = RunInfo(name=name, nominal_load=round(load, 2), notes=notes, steady_states=True)
-    made = streams(conditions, COUNTING, zlib.crc32(name.encode()))  # no two scatter alike
+    made = streams(conditions, COUNTING)
     recording = write(args.output / f"{name}.mcap", made, configured, info)
     return [args.output / f"{name}.yaml", recording]
 

@@ -80,7 +80,7 @@ class Judge:
         """
         parts = []
         for n, run in enumerate(self.rig.runs):
-            number = np.floor((self.time(n) + 0.5 * PAUSE) / (DURATION + PAUSE))
+            number = np.floor((self.time(n) - 0.5 * PAUSE) / (DURATION + PAUSE))
             inside = run.used[channel]
             parts += [
                 [np.nanmean(s[n][inside & (number == k)]) for s in series]

@@ -22,7 +22,7 @@ def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
     torque = trial.value("motor_shunt") * trial.settings.drive.torque_constant.value
     found = []
 
-    for begin in np.arange(6) * 7.0:
+    for begin in 1.0 + np.arange(6) * 7.0:  # the encoders speak a second earlier
         inside = (trial.time("motor_shunt") >= begin) & (trial.time("motor_shunt") < begin + 6.0)
         rim = trial.settings.wheel.radius * trial.speed("wheel_encoder", begin, begin + 6.0)
         slip = 1.0 - trial.speed("carriage_encoder", begin, begin + 6.0) / rim
@@ -158,13 +158,26 @@ def test_repeats_of_a_condition_tell_how_uncertain_a_value_is(
     assert pull.std(axis=1) / 60**0.5 == pytest.approx(3.0)
 
 
-def test_no_two_recordings_scatter_alike(tmp_path: Path) -> None:
-    """A pattern that several recordings share would count as a signal: ripples of the wheel."""
-    rows = [*rows_of(0.1, "sand"), *rows_of(0.1, "clay")]
-    (tmp_path / "two.csv").write_text("\n".join([HEADER, *rows]))
+def test_nothing_hangs_on_a_files_name_or_the_order_of_its_rows(tmp_path: Path) -> None:
+    """The same states have the same readings, and only these decide a diagnosis."""
+    rows = rows_of(0.1, "sand")
+    found = []
+    for name, ordered in (("one", rows), ("other", rows[::-1])):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / f"{name}.csv").write_text("\n".join([HEADER, *ordered]))
+        (folder / "soils.csv").write_text(SOILS)
+        main(["table", str(folder), "-o", str(folder / "out")])
+        found.append(Physical(folder / "out" / f"{name}.mcap").force("fx").reshape(3, -1))
+    np.testing.assert_allclose(found[0], found[1][::-1])
+
+
+def test_the_channels_of_a_state_do_not_scatter_together(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text("\n".join([HEADER, *rows_of(0.1, "sand")]))
     (tmp_path / "soils.csv").write_text(SOILS)
     main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
-    first, second = (Physical(tmp_path / "out" / f"two-{n}.mcap").force("fx") for n in (1, 2))
-    off = [f.reshape(3, -1) - f.reshape(3, -1).mean(axis=1, keepdims=True) for f in (first, second)]
-    for one, other in zip(*off, strict=True):
-        assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
+    trial = Physical(tmp_path / "out" / "one.mcap")
+    read = (trial.force("fx"), trial.force("fz"), trial.value("sinkage_pot"))
+    off = [f.reshape(3, -1) - f.reshape(3, -1).mean(axis=1, keepdims=True) for f in read]
+    together = np.corrcoef([each.ravel() for each in off])
+    assert np.abs(together[np.triu_indices(3, 1)]).max() < 0.3

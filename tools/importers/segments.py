@@ -74,7 +74,7 @@ def streams(conditions: Sequence[Condition], counting: Counting) -> list[Channel
     """The segments one after the other, as the channels of a recording. The encoders speak a pause
     earlier and later than all else, so that the first and the last readings have a speed too.
     """
-    seconds = np.arange(round(RATE * DURATION)) / RATE
+    seconds = PAUSE + np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
     times = np.concatenate(
         [stamps(START, seconds + spacing * number) for number in range(len(conditions))]

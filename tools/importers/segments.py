@@ -5,7 +5,7 @@ A table gives a mean and a standard deviation. Within a segment the readings tak
 a normal distribution, a tenth of a second each, in an order that differs by channel: the segment
 has mean and deviation exactly, and its mean is as uncertain as that of INDEPENDENT readings. Did
 they change faster, all scatter would average out, and a comparison would take the mean for exact.
-The order is the same in every segment and recording, so nothing hangs on it.
+The order is the same in every segment and recording, so equal states read the same in all.
 """
 
 from __future__ import annotations

@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gritd.estimator.config import configuration as config
 from gritd.tools.commands.import_rig import main
+from gritd.tools.diagnose.rig.adapter import rig_of
+from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.rigs.table import load_scatter, repeat_scatter
 from tests.real_recordings import REAL, Physical, needs
@@ -158,8 +161,7 @@ def test_repeats_of_a_condition_tell_how_uncertain_a_value_is(
     assert pull.std(axis=1) / 60**0.5 == pytest.approx(3.0)
 
 
-def test_nothing_hangs_on_a_files_name_or_the_order_of_its_rows(tmp_path: Path) -> None:
-    """The same states have the same readings, and only these decide a diagnosis."""
+def test_a_state_reads_the_same_under_any_name_and_in_any_row(tmp_path: Path) -> None:
     rows = rows_of(0.1, "sand")
     found = []
     for name, ordered in (("one", rows), ("other", rows[::-1])):
@@ -170,6 +172,19 @@ def test_nothing_hangs_on_a_files_name_or_the_order_of_its_rows(tmp_path: Path) 
         main(["table", str(folder), "-o", str(folder / "out")])
         found.append(Physical(folder / "out" / f"{name}.mcap").force("fx").reshape(3, -1))
     np.testing.assert_allclose(found[0], found[1][::-1])
+
+
+def test_a_diagnosis_sees_every_state_with_its_mean(tmp_path: Path) -> None:
+    """The first and the last too."""
+    (tmp_path / "one.csv").write_text("\n".join([HEADER, *rows_of(0.1, "sand")]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
+    settings = config.load(tmp_path / "out" / "one.yaml").settings
+    (run,) = rig_of(read_all([tmp_path / "out" / "one.mcap"]), settings)[0].runs
+    used, slip = run.used["drawbar_pull"], run.covariates["slip"]
+    states = [used & (np.abs(slip - each) < 1e-3) for each in (0.1, 0.2, 0.4)]
+    means = [run.measured["drawbar_pull"][at].mean() for at in states]
+    np.testing.assert_allclose(means, [1.0, 2.0, 4.0], atol=0.01)
 
 
 def test_the_channels_of_a_state_do_not_scatter_together(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from gritd.estimator.effects import make
@@ -14,6 +15,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
@@ -92,3 +94,17 @@ def test_the_new_campaign_does_not_tell_the_noise_or_the_sizes() -> None:
     assert len(loud.forms[places["soil in both"]].sizes.values) > 1
     for one, other in zip(quiet.problem.noise.colours, loud.problem.noise.colours, strict=True):
         assert other.sigma == pytest.approx(one.sigma, rel=0.2)
+
+
+def test_the_reference_may_be_silent_where_it_begins() -> None:
+    """It tells nothing of how runs begin, and the new campaign has it."""
+
+    def late(run: Signals) -> Signals:
+        heard = {name: np.where(run.time < 21.0, np.nan, v) for name, v in run.analogue.items()}
+        return replace(run, analogue=heard)
+
+    before = record(plan(seed=3, seconds=24.0, pace=2.0, wrench=False), ())
+    after = [replace(s, name=f"new-{s.name}") for s in record(plan(seed=4, wrench=False), ())]
+    base = fit_base(wheel_rig([*map(late, before), *after], settings(), len(before), "same"))
+    assert np.isfinite(base.model.evidence)
+    assert len(base.model.sizes) == len(base.forms)

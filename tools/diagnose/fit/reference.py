@@ -5,7 +5,8 @@ the library's effects in both campaigns (shared.py), and noise. Noise is what th
 beside the other two as they were *fitted*: what their priors do not let them follow counts as
 noise.
 
-All three are learnt from the reference alone. A size that the new campaign may raise takes what is
+All three are learnt from the reference alone: what shows in the new campaign only is no habit. A
+size that the new campaign may raise takes what is
 new for what is usual: some effects of both campaigns that cancel where the reference drove are
 never amiss in it.
 """
@@ -49,8 +50,8 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
     noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(first, noise, shared, ripples)
-    more = shared_terms(noise, shared, ripples)
-    sizes = usual.model.sizes
+    shown, sizes = {f.name for f in usual.forms}, usual.model.sizes
+    more = [f for f in shared_terms(noise, shared, ripples) if f.name in shown]
     return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
 
 

@@ -11,7 +11,7 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
+from gritd.tools.diagnose.rig.signals import drive_series, in_runs, is_drive, signals
 from gritd.tools.diagnose.rig.wheel import Bed, wheel_rig
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -65,7 +65,9 @@ def _wheel_rig(
 
     beside, lines = with_lines(ordered, means, settings, len(reference))
 
-    rig = wheel_rig(beside, settings, len(reference), bed, lines=lines)
+    known = len(in_runs(beside[: len(reference)]))
+
+    rig = wheel_rig(in_runs(beside), settings, known, bed, lines=lines)
     for new, each in ((False, reference), (True, recordings)):
         _check_drives(rig, new, each)
     return rig, rate

@@ -62,7 +62,8 @@ def _measured_run(data: Recorded, number: int, settings: Settings, sinkage: Arra
     if idle is not None and not data.tabled:  # what is lost needs no soil that has settled
         still["torque"] |= turning(motion, settings)
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
-    known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
+    if not data.tabled:
+        known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
     used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in data.channels}
     marks = (alone.astype(float), (turned & ~driving).astype(float))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +162,45 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         doubt(wheel, carriage),
         {name: values for name, values in analogue.items() if np.isfinite(values).any()},
         left_out,
+    )
+
+
+def in_runs(series: Sequence[Signals]) -> list[Signals]:
+    """Signals run by run: of a table of steady states every row is a run of its own."""
+    return [run for s in series for run in (_rows(s) if s.info.steady_states else [s])]
+
+
+def _rows(signals: Signals) -> list[Signals]:
+    """The rows of a table, parted by silence."""
+    heard = np.any([np.isfinite(values) for values in signals.analogue.values()], axis=0)
+    edges = np.flatnonzero(np.diff(heard.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    if len(edges) == 1:
+        return [_row(signals, slice(*edges[0]), signals.name)]
+    named = ((f"{signals.name}, row {n}", edge) for n, edge in enumerate(edges, start=1))
+    return [_row(signals, slice(*edge), name) for name, edge in named]
+
+
+def _row(signals: Signals, at: slice, name: str) -> Signals:
+    """One speed of wheel and carriage: how far they drove, and what came before, a table does not
+    tell.
+    """
+    begins = float(signals.time[at.start])
+
+    def held(values: Array) -> Array:
+        return np.full(at.stop - at.start, np.nanmedian(values[at]))
+
+    return replace(
+        signals,
+        name=name,
+        start=signals.start + begins,
+        time=signals.time[at] - begins,
+        wheel_angle=held(signals.wheel_angle),
+        wheel_speed=held(signals.wheel_speed),
+        wheel_acceleration=np.zeros(at.stop - at.start),
+        carriage_angle=held(signals.carriage_angle),
+        carriage_rate=held(signals.carriage_rate),
+        doubt=held(signals.doubt),
+        analogue={channel: values[at] for channel, values in signals.analogue.items()},
     )
 
 

@@ -137,10 +137,11 @@ def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[F
 def more_families(stack: Stack, noise: Noise) -> tuple[Family, ...]:
     """Where else a misfit may live: ripples of the wheel, steps along slip and between runs."""
     searched, known = [], stack.rig.runs[0].covariates
+    runs = () if stack.rig.tabled else ("run",)  # rows of a table have no order
     for channel in stack.rig.channels:
         turning = orders_shown(stack, 1.0) / (2.0 * np.pi)
         searched.append(waves(stack, noise, channel, "wheel_angle", turning, stack.new))
-        for axis in ("slip", "run") if "slip" in known else ("run",):
+        for axis in ("slip", *runs) if "slip" in known else runs:
             searched.append(steps(stack, noise, channel, axis, stack.new))
 
     return tuple(family for family in searched if family.blocks)

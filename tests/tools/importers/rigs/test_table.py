@@ -10,8 +10,11 @@ import pytest
 
 from gritd.estimator.config import configuration as config
 from gritd.tools.commands.import_rig import main
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import read_all
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import begin
 from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.rigs.table import load_scatter, repeat_scatter
 from tests.real_recordings import REAL, Physical, needs
@@ -25,10 +28,10 @@ def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
     torque = trial.value("motor_shunt") * trial.settings.drive.torque_constant.value
     found = []
 
-    for begin in 1.0 + np.arange(6) * 7.0:  # the encoders speak a second earlier
-        inside = (trial.time("motor_shunt") >= begin) & (trial.time("motor_shunt") < begin + 6.0)
-        rim = trial.settings.wheel.radius * trial.speed("wheel_encoder", begin, begin + 6.0)
-        slip = 1.0 - trial.speed("carriage_encoder", begin, begin + 6.0) / rim
+    for start in 1.0 + np.arange(6) * 7.0:  # the encoders speak a second earlier
+        inside = (trial.time("motor_shunt") >= start) & (trial.time("motor_shunt") < start + 6.0)
+        rim = trial.settings.wheel.radius * trial.speed("wheel_encoder", start, start + 6.0)
+        slip = 1.0 - trial.speed("carriage_encoder", start, start + 6.0) / rim
         found.append((slip, trial.force("fx")[inside].mean(), torque[inside].mean()))
         assert trial.force("fz")[inside].mean() == pytest.approx(80.0)
 
@@ -180,11 +183,33 @@ def test_a_diagnosis_sees_every_state_with_its_mean(tmp_path: Path) -> None:
     (tmp_path / "soils.csv").write_text(SOILS)
     main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
     settings = config.load(tmp_path / "out" / "one.yaml").settings
-    (run,) = rig_of(read_all([tmp_path / "out" / "one.mcap"]), settings)[0].runs
-    used, slip = run.used["drawbar_pull"], run.covariates["slip"]
-    states = [used & (np.abs(slip - each) < 1e-3) for each in (0.1, 0.2, 0.4)]
-    means = [run.measured["drawbar_pull"][at].mean() for at in states]
-    np.testing.assert_allclose(means, [1.0, 2.0, 4.0], atol=0.01)
+    runs = rig_of(read_all([tmp_path / "out" / "one.mcap"]), settings)[0].runs
+    seen = [
+        (r.covariates["slip"], r.measured["drawbar_pull"], r.used["drawbar_pull"]) for r in runs
+    ]
+    means = [(slip[used].mean(), pull[used].mean()) for slip, pull, used in seen]
+    np.testing.assert_allclose(means, [(0.1, 1.0), (0.2, 2.0), (0.4, 4.0)], atol=0.01)
+
+
+def test_no_result_depends_on_the_order_of_rows(tmp_path: Path) -> None:
+    """A wheel beside another, both as tables."""
+    before, new = (
+        rows_of(0.1, "sand"),
+        [row.replace("0.01", "0.012") for row in rows_of(0.1, "sand")],
+    )
+    found = []
+    for way, order in enumerate((slice(None), slice(None, None, -1))):
+        folder = tmp_path / str(way)
+        folder.mkdir()
+        for name, rows in (("before", before), ("new", new)):
+            (folder / f"{name}.csv").write_text("\n".join([HEADER, *rows[order]]))
+        (folder / "soils.csv").write_text(SOILS)
+        main(["table", str(folder), "-o", str(folder / "out")])
+        new_one, known = (read_all([folder / "out" / f"{n}.mcap"]) for n in ("new", "before"))
+        settings = config.load(folder / "out" / "before.yaml").settings
+        first = begin(prepare_screening(fit_base(rig_of(new_one, settings, known)[0]))).first
+        found.append((first.ratio, *first.evidence.values()))
+    np.testing.assert_allclose(found[0], found[1], atol=0.1)
 
 
 def test_the_channels_of_a_state_do_not_scatter_together(tmp_path: Path) -> None:

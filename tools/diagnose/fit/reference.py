@@ -5,10 +5,9 @@ the library's effects in both campaigns (shared.py), and noise. Noise is what th
 beside the other two as they were *fitted*: what their priors do not let them follow counts as
 noise.
 
-All three are learnt from the reference alone: what shows in the new campaign only is no habit. A
-size that the new campaign may raise takes what is
-new for what is usual: some effects of both campaigns that cancel where the reference drove are
-never amiss in it.
+All three are learnt from the reference alone: of what the new campaign alone shows nothing is
+known. A size that the new campaign may raise takes what is new for what is usual: some effects of
+both campaigns that cancel where the reference drove are never amiss in it.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ def test_friction_that_is_new_is_not_taken_for_one_that_the_reference_hides() ->
     assert not begin(prepare_screening(fit_base(elsewhere(())))).first.alarmed
 
 
-def test_the_new_campaign_does_not_tell_the_noise_or_the_sizes() -> None:
+def test_the_new_campaign_does_not_tell_the_noise_the_sizes_or_what_is_usual() -> None:
     quiet, loud = (fit_base(elsewhere(new)) for new in ((), (NEW,)))
     assert quiet.model.sizes == loud.model.sizes
     places = {f.name: number for number, f in enumerate(loud.forms)}
@@ -93,7 +93,9 @@ def test_the_new_campaign_does_not_tell_the_noise_or_the_sizes() -> None:
     assert loud.model.sizes[changes] == 0 and loud.forms[changes].sizes.values == (0.0,)
     assert len(loud.forms[places["soil in both"]].sizes.values) > 1
     for one, other in zip(quiet.problem.noise.colours, loud.problem.noise.colours, strict=True):
-        assert other.sigma == pytest.approx(one.sigma, rel=0.2)
+        assert other.sigma == pytest.approx(one.sigma, rel=1e-3)
+    assert quiet.usual is not None
+    np.testing.assert_allclose(loud.usual, quiet.usual, atol=0.01)
 
 
 def test_the_reference_may_be_silent_where_it_begins() -> None:

@@ -5,7 +5,7 @@ noise.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ class BaseFit:
     problem: Problem
     model: Model
     forms: tuple[RandomEffect, ...] = ()  # what the form of the model may be off by
+    usual: Array | None = None  # (q,) constants as a reference alone tells them
 
     @property
     def fitted(self) -> Fitted:
@@ -40,14 +41,21 @@ class BaseFit:
 
 def fit_roughly(stack: Stack) -> BaseFit:
     """In white noise, to linearise about: a few steps, since a fit that converged would have bent
-    soil and calibration to whatever the equations miss.
+    soil and calibration to whatever the equations miss. Beside a reference that alone tells, since
+    what is new would bend them too.
     """
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
+    told = of_reference(noise) if stack.referred else noise
 
-    problem = Problem(stack, noise, allowed(stack))
+    problem = Problem(stack, told, allowed(stack))
     fitted = problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds)
-    return BaseFit(problem, Model(fitted))
+    return BaseFit(Problem(stack, noise, allowed(stack)), Model(fitted))
+
+
+def of_reference(noise: Noise) -> Noise:
+    """The noise in which the new campaign says nothing."""
+    return replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
 
 
 def explainable(rough: BaseFit) -> Explainable:

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
+from gritd.tools.diagnose.fit.base import BaseFit, of_reference, refit_beside, sized_beside
 from gritd.tools.diagnose.fit.discrepancy import form_terms
 from gritd.tools.diagnose.fit.shared import (
     lasting,
@@ -33,7 +33,7 @@ from gritd.tools.diagnose.noise.saturated import Explainable
 
 
 def fit_beside_reference(rough: BaseFit) -> BaseFit:
-    """From a rough fit of both campaigns: first in the least noise that the reference may have,
+    """From a rough fit of the reference: first in the least noise that the reference may have,
     then in what the fit left of it.
     """
     stack = rough.problem.stack
@@ -51,15 +51,16 @@ def fit_beside_reference(rough: BaseFit) -> BaseFit:
     usual = _of_reference(first, noise, shared, ripples)
     shown, sizes = {f.name for f in usual.forms}, usual.model.sizes
     more = [f for f in shared_terms(noise, shared, ripples) if f.name in shown]
-    return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
+    base = sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
+    return replace(base, usual=usual.fitted.u)
 
 
 def _of_reference(
     start: BaseFit, noise: Noise, shared: Mapping[str, Array], ripples: Array
 ) -> BaseFit:
     """The reference alone, fitted with all its terms: the new campaign says nothing."""
-    blind = replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
-    return refit_beside(start, blind, shared_terms(blind, shared, ripples))
+    alone = of_reference(noise)
+    return refit_beside(start, alone, shared_terms(alone, shared, ripples))
 
 
 def left(base: BaseFit) -> Array:

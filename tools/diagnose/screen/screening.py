@@ -46,7 +46,8 @@ class Screening:
     """All that may be amiss beside the effects.
 
     base: exact in its form; forms: what the form of the model may be off by; functions: smooth
-    unexplained terms; families: unexplained waves and steps.
+    unexplained terms; families: unexplained waves and steps; usual: (q,) constants as a reference
+    alone tells them, where fits of what is new begin.
     """
 
     problem: Problem
@@ -54,6 +55,7 @@ class Screening:
     forms: tuple[RandomEffect, ...]
     functions: tuple[Signature, ...]
     families: tuple[Family, ...]
+    usual: Array | None = None
 
     @property
     def beyond_form(self) -> list[Signature]:
@@ -87,6 +89,7 @@ def prepare_screening(base: BaseFit) -> Screening:
         base.forms,
         smooth_signatures(problem.stack),
         families(problem.stack, problem.noise),
+        base.usual,
     )
 
 

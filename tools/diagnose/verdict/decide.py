@@ -110,6 +110,7 @@ def judged(
         np.array([w.functions for w in weighed]),
         np.array([_companions(w, weighed) for w in weighed]),
     )
+    weights = weights + np.log(np.maximum([w.fitting for w in weighed], SPAN))
     shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
@@ -195,8 +196,8 @@ def trusting(
         if w.names:
             share, shares = _taken(search, w.model)
             common = in_one_place(search.problem.stack, w.model)
-            trust = trusted(rig, w.model, shares.tolist(), by)
-            w = replace(w, common=common, share=share, trust=trust)
+            trust, fitting = trusted(rig, w.model, shares.tolist(), by)
+            w = replace(w, common=common, share=share, trust=trust, fitting=fitting)
         made.append(w)
     return made
 

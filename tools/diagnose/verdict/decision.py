@@ -23,6 +23,8 @@ class WeighedExplanation:
     share:    of the misfit that the effects take.
     trust:    of each effect, the probability that it is there and nothing that resembles it, if
         this explanation is the best.
+    fitting:  how likely it is that its effects, or what resembles them, are seen so: 1 for effects
+        that are there and take all of the misfit.
     """
 
     model: Model
@@ -33,6 +35,7 @@ class WeighedExplanation:
     common: float = 0.0
     share: float = 0.0
     trust: tuple[float, ...] = ()
+    fitting: float = 1.0
 
     @property
     def nameless(self) -> bool:

@@ -9,9 +9,11 @@ resembles it a lesser share s. With the share λ of explanations that mislead (c
 
     P(effect) = Σ L(h) (1 − λ) p(h, s | effect) / Σ L(h) [(that) + λ p(h, s | other)]
 
-where p(h, s | …) = p(h | …) k sᵏ⁻¹. The odds of what must vary with the place on the bed are
-lower. L is not tempered as evidence between explanations is: both
-priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
+where p(h, s | …) = p(h | …) k sᵏ⁻¹. The denominator, over the sum of L(h) with the prior of the
+search, is how likely it is that something is seen so at all: by it an explanation whose law must be
+bent far, or which leaves much, weighs less against others that fit. The odds of what must vary with
+the place on the bed are lower. L is not tempered as evidence between explanations is: both priors
+were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
 of it h says nothing. Where runs that were held out are predicted worse with the effect, its odds
 are lower: of what only resembles it that is oftener so.
 """
@@ -36,29 +38,41 @@ from gritd.tools.diagnose.tuning.guards import SPAN
 
 def trusted(
     rig: Rig, model: Model, shares: Sequence[float], by: OddsCalibration
-) -> tuple[float, ...]:
+) -> tuple[tuple[float, ...], float]:
     """Of each effect of a model, the probability that it is there, if the model is the best
-    explanation. shares: of the misfit, or of that where it acts, which are taken.
+    explanation; and how likely it is that they, or what resembles them, are seen so: 1 for effects
+    that are there and take all of the misfit. shares: of the misfit, or of that where it acts,
+    which are taken.
     """
-    return tuple(
-        believed(_of_law(rig, model, name), _of_place(model, name), share, by.lapse)
+    every = [
+        seen(_of_law(rig, model, name), _of_place(model, name), share, by.lapse)
         for name, share in zip(model.names, shares, strict=True)
-    )
+    ]
+    largest = (1.0 - by.lapse) * TUNING.verdict.share_power
+    fitting = np.prod([(there + alike) / largest for there, alike in every])
+    return tuple(believed(*each) for each in every), float(fitting)
 
 
-def believed(law: Array | None, place: Array | None, share: float, lapse: float) -> float:
-    """Probability that an effect is there. law (h,): log likelihood of each size of its form error;
-    place (p,): log evidence of each share that varies with the place; None where that says nothing.
+def seen(law: Array | None, place: Array | None, share: float, lapse: float) -> tuple[float, float]:
+    """How likely it is that an effect is there and seen so, and that something resembles it and is.
+    law (h,): log likelihood of each size of its form error; place (p,): log evidence of each share
+    that varies with the place; None where that says nothing.
     """
     there = (1.0 - lapse) * _of_share(share, TUNING.verdict.share_power)
     alike = lapse * _of_share(share, TUNING.verdict.share_power_other)
     if law is not None:
         likelihood = np.exp(law - law.max())
+        likelihood /= likelihood @ np.array(TUNING.fit.form_error_prior)
         there *= float(likelihood @ np.array(TUNING.verdict.form_own))
         alike *= float(likelihood @ np.array(TUNING.verdict.form_other))
     if place is not None:
         there *= float(np.exp(place - log_sum(place)) @ np.array(TUNING.verdict.place_odds))
-    return float(there / max(there + alike, SPAN))
+    return there, alike
+
+
+def believed(there: float, alike: float) -> float:
+    """Probability that an effect is there."""
+    return there / max(there + alike, SPAN)
 
 
 def likely(probability: float) -> bool:

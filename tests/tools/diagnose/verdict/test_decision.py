@@ -227,21 +227,44 @@ def test_a_simpler_name_that_is_less_likely_than_none_comes_after_one_that_is_li
     assert found.best.names == ("richer",)
 
 
+def sure_of(law: Any, place: Any, share: float, lapse: float) -> float:
+    return resemblance.believed(*resemblance.seen(law, place, share, lapse))
+
+
+def test_a_law_that_must_be_bent_does_not_keep_a_name_from_one_that_fits(
+    names_alone: None,
+) -> None:
+    """As likely as it, and so far off that it only resembles the misfit."""
+    bare, fits, bent = Fit((), 0), Fit(("fits",)), Fit(("bent",))
+    straight, far = np.array([[0.0, 0, -9, -9], [-9.0, -9, -9, 0]])
+    weighed: Any = []
+    for model, law in ((fits, straight), (bent, far)):
+        there, alike = resemblance.seen(law, None, 0.95, 0.13)
+        trust = (resemblance.believed(there, alike),)
+        weighed.append(
+            decide.WeighedExplanation(
+                cast(Any, model), model.names, 0, 900.0, 0.0, 0.0, 0.95, trust, there + alike
+            )
+        )
+    found = decide.judged(_searched(bare), weighed, {}, learnt(30))
+    assert found.best.names == ("fits",) and found.probability["fits"] > 0.5
+
+
 def test_a_form_error_that_no_published_law_needs_tells_against_a_name() -> None:
     """As much likelihood without bending and with it says little; bending that pays says much."""
     straight, open_, bent = np.array([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])
-    believed = [resemblance.believed(law, None, 0.9, 0.13) for law in (straight, open_, bent)]
+    believed = [sure_of(law, None, 0.9, 0.13) for law in (straight, open_, bent)]
     assert believed[0] > 0.97 > believed[1] > 0.5 and believed[2] < 0.5
-    assert resemblance.believed(straight, None, 0.05, 0.13) < believed[0]
+    assert sure_of(straight, None, 0.05, 0.13) < believed[0]
 
 
 def test_an_effect_that_is_there_on_a_part_of_the_bed_only_is_doubted() -> None:
     even, placed = np.array([[0.0, -9, -9], [-9.0, -9, 0]])
     straight, bent = np.array([[0.0, 0, -9, -9], [-9.0, -9, -9, 0]])
-    as_sure = resemblance.believed(straight, even, 0.9, 0.13)
-    assert as_sure == pytest.approx(resemblance.believed(straight, None, 0.9, 0.13), abs=1e-3)
-    assert resemblance.believed(straight, placed, 0.9, 0.13) < 0.9 < as_sure
-    assert resemblance.believed(bent, placed, 0.9, 0.13) < 0.2
+    as_sure = sure_of(straight, even, 0.9, 0.13)
+    assert as_sure == pytest.approx(sure_of(straight, None, 0.9, 0.13), abs=1e-3)
+    assert sure_of(straight, placed, 0.9, 0.13) < 0.9 < as_sure
+    assert sure_of(bent, placed, 0.9, 0.13) < 0.2
 
 
 def test_explanations_with_one_and_with_two_effects_stand_together_against_none(

@@ -133,7 +133,8 @@ def dictionary(screening: Screening, model: Model) -> Dictionary:
     problem = screening.problem
     beside = without_harmonics(problem, model.fitted)
     families = [*screening.families, *more_families(problem.stack, problem.noise)]
-    smooth = [s for s in screening.functions if s.shape.along != ("wheel_angle",)]
+    rows = [("run",)] if problem.stack.rig.tabled else []  # each is known by its slip and load
+    smooth = [s for s in screening.functions if s.shape.along not in (("wheel_angle",), *rows)]
 
     likeliest: dict[Shape, Signature] = {}
     for one in candidates(families, problem, beside):

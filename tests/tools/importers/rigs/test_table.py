@@ -10,7 +10,7 @@ import pytest
 
 from gritd.estimator.config import configuration as config
 from gritd.tools.commands.import_rig import main
-from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.screen.screening import prepare_screening
@@ -210,6 +210,29 @@ def test_no_result_depends_on_the_order_of_rows(tmp_path: Path) -> None:
         first = begin(prepare_screening(fit_base(rig_of(new_one, settings, known)[0]))).first
         found.append((first.ratio, *first.evidence.values()))
     np.testing.assert_allclose(found[0], found[1], atol=0.1)
+
+
+@pytest.mark.long
+def test_a_wheel_that_pulls_and_takes_twice_as_much_is_seen_by_slip(tmp_path: Path) -> None:
+    """A large effect moves no soil of a bed that was prepared anew, which the reference tells."""
+    constant = "me,0.068,0.064,soil,0.021,12.2"
+    before = "0.152,-1.3,0.0096,0.15 0.264,-0.5,0.01,0.18 0.376,0.1,0.0094,0.25 0.6,1.2,0.01,0.33"
+    new = "0.152,1.7,0.0095,0.38 0.264,3.5,0.0096,0.52 0.376,5.1,0.0088,0.64 0.6,7.5,0.009,0.84"
+    for name, rows in (("before", before), ("new", new)):
+        lines = [f"{HEADER},meas_torque_nm", *(f"{constant},{row}" for row in rows.split())]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines))
+    soil = "soil,1.1,0,1400,0.25,32"
+    (tmp_path / "soils.csv").write_text("\n".join([SOILS.partition("\n")[0], soil]))
+    stated = "--torque-sigma 0.01 --drawbar-pull-sigma 0.05 --sinkage-sigma 0.0003"
+    arguments = f"--soil-strength table {stated}".split()
+    main(["table", str(tmp_path), "-o", str(tmp_path / "out"), *arguments])
+
+    recordings = (read_all([tmp_path / "out" / f"{n}.mcap"]) for n in ("new", "before"))
+    settings = config.load(tmp_path / "out" / "before.yaml").settings
+    fresh, known = recordings
+    found = diagnose(rig_of(fresh, settings, known)[0])
+    assert found.verdict in ("explained", "unlisted") and found.location
+    assert "run" not in {place.covariate for place in found.location}
 
 
 def test_the_channels_of_a_state_do_not_scatter_together(tmp_path: Path) -> None:

@@ -213,8 +213,8 @@ def test_no_result_depends_on_the_order_of_rows(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_wheel_that_pulls_and_takes_twice_as_much_is_seen_by_slip(tmp_path: Path) -> None:
-    """A large effect moves no soil of a bed that was prepared anew, which the reference tells."""
+def test_a_wheel_that_pulls_and_takes_twice_as_much_is_seen(tmp_path: Path) -> None:
+    """Of a bed that was prepared anew no soil explains it. It is told by slip, not row by row."""
     constant = "me,0.068,0.064,soil,0.021,12.2"
     before = "0.152,-1.3,0.0096,0.15 0.264,-0.5,0.01,0.18 0.376,0.1,0.0094,0.25 0.6,1.2,0.01,0.33"
     new = "0.152,1.7,0.0095,0.38 0.264,3.5,0.0096,0.52 0.376,5.1,0.0088,0.64 0.6,7.5,0.009,0.84"

@@ -110,8 +110,7 @@ def judged(
         np.array([w.functions for w in weighed]),
         np.array([_companions(w, weighed) for w in weighed]),
     )
-    weights = weights + np.log(np.maximum([w.fitting for w in weighed], SPAN))
-    shares = np.exp(weights - logsumexp(weights))
+    shares = _by_fit(weighed, np.exp(weights - logsumexp(weights)))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
     best = _best([w for w in every if w.names] or every, _unlisted(every))
@@ -136,6 +135,16 @@ def judged(
             if name not in named.names and likely(_together(every)[frozenset(best.names)])
         ),
     )
+
+
+def _by_fit(weighed: Sequence[WeighedExplanation], shares: Array) -> Array:
+    """Shares (k,) of explanations, those of listed effects by how well these fit: a law that must
+    be bent does not keep a name from one that fits. What they have together stays.
+    """
+    listed = np.array([bool(w.names) for w in weighed])
+    fitting = shares * np.array([w.fitting for w in weighed])
+    whole = float(fitting[listed].sum())
+    return np.where(listed, fitting * shares[listed].sum() / max(whole, SPAN), shares)
 
 
 def _companions(of: WeighedExplanation, weighed: Sequence[WeighedExplanation]) -> float:

@@ -111,7 +111,7 @@ not part it: effects whose form is bent by 40 % take more of the misfit than `sl
 """
 HIDDEN = """
 The smooth wheel's own misfit is 30 % of every channel. Lugs fit what is new, with a probability of
-0.37, but laws that must be bent by 40 % fit as well, so that none of the list is there is likelier.
+0.38, but laws that must be bent by 40 % fit as well, so that none of the list is there is likelier.
 """
 
 STRENGTH = Proof(

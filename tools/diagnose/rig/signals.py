@@ -172,10 +172,12 @@ def in_runs(series: Sequence[Signals]) -> list[Signals]:
 
 def _rows(signals: Signals) -> list[Signals]:
     """The rows of a table, parted by silence."""
-    heard = np.any([np.isfinite(values) for values in signals.analogue.values()], axis=0)
+    heard = np.zeros(signals.time.size, bool)
+    for values in signals.analogue.values():
+        heard |= np.isfinite(values)
     edges = np.flatnonzero(np.diff(heard.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    if len(edges) == 1:
-        return [_row(signals, slice(*edges[0]), signals.name)]
+    if len(edges) < 2:
+        return [_row(signals, slice(*edge), signals.name) for edge in edges] or [signals]
     named = ((f"{signals.name}, row {n}", edge) for n, edge in enumerate(edges, start=1))
     return [_row(signals, slice(*edge), name) for name, edge in named]
 

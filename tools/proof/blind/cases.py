@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gritd.tools.proof.blind import campaign, detect, knowledge
+from gritd.tools.proof.blind import campaign, detect, knowledge, printed
 from gritd.tools.proof.blind.detect import BlindTrial, Detector
 from gritd.tools.proof.blind.groups import NEEDED
 from gritd.tools.proof.blind.plant import worlds
@@ -136,7 +136,7 @@ def _attempt(
 ) -> BlindCase:
     design = campaign.design_drawn(rng, _fixed(assignment))
     family, trial, reference = _trials(design, assignment, rng)
-    detector = Detector(trial)
+    detector = _detector(trial)
     facts = detector.facts()
 
     made = [effect_drawn(name, rng, facts) for name in assignment.effects]
@@ -163,6 +163,10 @@ def _attempt(
     )
 
 
+def _detector(trial: BlindTrial) -> Detector:
+    return printed.PrintedDetector(trial) if trial.printed else Detector(trial)
+
+
 def _fixed(assignment: Assignment) -> campaign.Design:
     fixed: dict[str, Any] = dict(assignment.without)
     for name in assignment.effects:
@@ -178,6 +182,8 @@ def _trials(
     if not assignment.pair:
         return family, trial, None
 
+    if assignment.printed:
+        trial = replace(trial, printed=printed.errors_drawn(trial, rng))
     runs = _runs(trial.world.rig, trial.world.ground, design, rng)
     reference = replace(trial, runs=runs)
     if assignment.bed == "prepared":
@@ -237,7 +243,7 @@ def _judged(case: BlindCase, rng: np.random.Generator) -> BlindCase:
     """With the oracle's error, and the rivals that this campaign cannot tell from a single listed
     effect.
     """
-    detector = Detector(case.trial)
+    detector = _detector(case.trial)
     added = detector.refit_variance(case.effects)
     unit = {"current": case.trial.known.torque_constant.value**2}
     variance = {CHANNELS[name]: unit.get(name, 1.0) * value for name, value in added.items()}

@@ -11,8 +11,8 @@ detectability D: the effect costs a model that knows everything else D²/2 nats.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,8 @@ class BlindTrial:
     known: Knowledge
     chain: SensorChain
     runs: tuple[campaign.BlindRun, ...]
+    # standard deviations [SI] of what is printed of it, by channel; none where it is recorded
+    printed: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def wrench(self) -> bool:
@@ -66,10 +68,8 @@ class Detector:
 
     def __init__(self, trial: BlindTrial) -> None:
         self._trial = trial
-        self._motions = [_motion(run, trial) for run in trial.runs]
-        bare = trial.world.with_effects()
-
-        self._bare = responses([(bare, motion) for motion in self._motions], damped=False)
+        self._motions = _motions(trial)
+        self._bare = undisturbed(trial)
         self._roots = [noise_roots(trial.chain, felt) for felt in self._bare]
         self._own = self._misfit(())  # a leaking sensor misleads without concealed effects, too
         self._nuisance = [*self._soil_and_weights(), *self._calibration()]
@@ -261,6 +261,16 @@ class Detector:
             }
             for run in read
         ]
+
+
+def undisturbed(trial: BlindTrial) -> list[Felt]:
+    """What each run would feel without the concealed effects, at RATE."""
+    bare = trial.world.with_effects()
+    return responses([(bare, motion) for motion in _motions(trial)], damped=False)
+
+
+def _motions(trial: BlindTrial) -> list[TrueMotion]:
+    return [_motion(run, trial) for run in trial.runs]
 
 
 def _seen(felt: Felt, trial: BlindTrial) -> TrueMotion:

@@ -14,7 +14,7 @@ from gritd.config import packaged
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
-from gritd.tools.proof.blind import campaign
+from gritd.tools.proof.blind import campaign, printed
 from gritd.tools.proof.blind.cases import BlindCase
 from gritd.tools.proof.blind.detect import BlindTrial
 from gritd.tools.proof.blind.knowledge import Instrument, Knowledge, Stated
@@ -70,6 +70,8 @@ def write(case: BlindCase, campaigns: Sequence[DrivenCampaign], folder: Path) ->
     """testbed.yaml, its CAN database and run-1.mcap … of each campaign in a new folder. Returns the
     recordings. Raises OSError.
     """
+    if case.assignment.printed:
+        return _printed(case, campaigns, folder)
     folder.mkdir(parents=True)
     text = configuration(case.stated(), case.trial.runs[0].weight)
     (folder / CONFIGURATION).write_text(text, encoding="utf-8")
@@ -81,6 +83,21 @@ def write(case: BlindCase, campaigns: Sequence[DrivenCampaign], folder: Path) ->
         for one in campaigns
         for number in range(len(one.felt))
     ]
+
+
+def _printed(case: BlindCase, campaigns: Sequence[DrivenCampaign], folder: Path) -> list[Path]:
+    """The tables, the recordings that the importer makes of them, and its configuration of the
+    reference.
+    """
+    felt = {one.folder: (one.trial, one.felt) for one in campaigns}
+    imported = printed.write(felt, case.noise_factor, case.seed, folder)
+    shutil.copyfile(imported / f"{REFERENCE}.yaml", folder / CONFIGURATION)
+    paths = []
+    for one in campaigns:
+        (folder / one.folder).mkdir()
+        path = imported / f"{one.folder}.mcap"
+        paths.append(path.rename(folder / one.folder / path.name))
+    return paths
 
 
 def _record(

@@ -16,7 +16,7 @@ from gritd.tools.proof.blind.strata import AWKWARD, LEVELS, STRATA
 from gritd.tools.proof.blind.verdicts import CaseRow
 
 BY = ("name", "table", "engine", "plant")  # how a name counts as right
-AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair"))
+AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair", "table"))
 ONE = ("single", "usual", "absorbed", "confounded")  # strata with one listed effect
 
 
@@ -49,10 +49,11 @@ def score(rows: Sequence[CaseRow]) -> dict[str, Any]:
         "parameters": _coverage(row.parameters for row in effects),
         "heldout": {name: heldout(of) for name, of in _heldout_groups(home, detectable).items()},
         "foreign": score_worlds.foreign([row for row in rows if row.stratum == "foreign"]),
-        "pairs": score_worlds.pairs([row for row in rows if row.pair]),
+        "pairs": score_worlds.pairs([row for row in rows if row.stratum == "pair"]),
+        "tables": score_worlds.pairs([row for row in rows if row.stratum == "table"]),
         "confusion": confusion(rows),
         "seconds": quantiles([row.seconds for row in rows]),
-        "seconds of pairs": quantiles([row.seconds for row in rows if row.pair]),
+        "seconds of pairs": quantiles([row.seconds for row in rows if row.stratum == "pair"]),
     }
 
 

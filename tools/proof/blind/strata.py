@@ -26,6 +26,7 @@ SHARES = {
     "unlisted": 0.08,
     "foreign": 0.10,
     "pair": 0.19,
+    "table": 0.10,
 }
 STRATA = tuple(SHARES)
 # times the detection limit; the strongest is what bends the form of the model most
@@ -36,6 +37,19 @@ PLAIN = ("medium", "strong")  # levels in foreign worlds and of what is new
 # nothing, or physics outside the list.
 FOREIGN_KINDS = ("nothing", "listed", "listed")
 PAIR_KINDS = ("nothing", "nothing", "listed", "listed", "listed", "unlisted")
+TABLE_KINDS = ("nothing", "nothing", "lugs", "lugs", "listed", "listed", "unlisted")
+LUGS = ("grousers",)  # what laboratories print beside a smooth wheel
+STEADY = (  # what a steady state shows
+    "bulldozing", "sidewall_friction", "shear_peak", "rear_contact", "stress_peak_shift",
+    "slip_sinkage", "rim_friction", "wheel_radius_error", "bed_slope", "frame_compliance",
+    "side_wall_rubbing", "coulomb_friction", "load_dependent_friction", "torque_constant_error",
+    "force_crosstalk", "sinkage_datum", "sinkage_gain",
+)  # fmt: skip
+# a table tells nothing of the course: every stretch is one row
+COURSE = (
+    ("standstill", False), ("reversal", False), ("lifted", False), ("second_pass", False),
+    ("staircase", False), ("speeds", False), ("wrench", True),
+)  # fmt: skip
 BEDS = ("same", "prepared")
 PAIR_RUNS = (2, 3, 4)  # of each campaign of a pair
 
@@ -55,6 +69,11 @@ class Assignment:
     @property
     def pair(self) -> bool:
         return bool(self.bed)
+
+    @property
+    def printed(self) -> bool:
+        """Whether it is handed over as tables of steady states."""
+        return self.stratum == "table"
 
 
 AWKWARD = (
@@ -84,7 +103,7 @@ def assignments(
 ) -> list[Assignment]:
     """As many as cases, strata by their shares, effects and levels in turn, the order of chance.
 
-    `worlds`: those of foreign campaigns and of pairs; the other strata are at home in the paper's.
+    `worlds`: those of foreign campaigns, pairs and tables; the others are at home in the paper's.
     """
     counts = _counts(cases, strata)
     drawn = [item for stratum, count in counts.items() for item in _of(stratum, count, worlds, rng)]
@@ -120,6 +139,9 @@ def _of(
         return _in_worlds("foreign", count, foreign, FOREIGN_KINDS, rng)
     if stratum == "pair":
         return [_paired(one, rng) for one in _in_worlds("pair", count, worlds, PAIR_KINDS, rng)]
+    if stratum == "table":
+        drawn = _in_worlds("table", count, worlds, TABLE_KINDS, rng, STEADY)
+        return [_paired(replace(one, without=COURSE), rng) for one in drawn]
 
     if stratum == "usual":
         return [Assignment("usual", (name,), USUAL) for name in _shuffled(LISTED, count, rng)]
@@ -170,12 +192,11 @@ def _in_worlds(
     worlds: tuple[str, ...],
     kinds: tuple[str, ...],
     rng: np.random.Generator,
+    listed: tuple[str, ...] = tuple(LISTED),
 ) -> list[Assignment]:
     """Worlds and kinds in turn; names in turn, those left out that a world has of its own."""
-    waiting = {
-        "listed": _at_levels(tuple(LISTED), 2 * count, PLAIN, rng),
-        "unlisted": _at_levels(tuple(UNLISTED), 2 * count, PLAIN, rng),
-    }
+    kinds_of = {"listed": listed, "unlisted": tuple(UNLISTED), "lugs": LUGS}
+    waiting = {kind: _at_levels(of, 2 * count, PLAIN, rng) for kind, of in kinds_of.items()}
 
     assigned = []
     for world, kind in _shuffled(product(worlds, kinds), count, rng):

@@ -30,6 +30,8 @@ def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
         "Soil: how often sigma covers the truth": coverage(score["soil"]),
         "A reference campaign, then a new one": pairs(score["pairs"]),
         "All names accepted as new": accepted(score["pairs"].get("all", {}).get("accepted", {})),
+        "Tables of steady states: a reference wheel, then a new one": pairs(score["tables"]),
+        "Soil of the new table": coverage({n: of["soil"] for n, of in score["tables"].items()}),
         "Soil of the new campaign": coverage({n: of["soil"] for n, of in score["pairs"].items()}),
         "Campaigns alone in foreign worlds": foreign(score["foreign"]),
         "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
@@ -300,7 +302,7 @@ def explained(row: CaseRow) -> str:
 def _truth(row: CaseRow) -> str:
     truth = " + ".join(row.truth) or "none"
     strength = f" {row.level} D={row.detectability:.0f}" if row.truth else f" {row.level}".rstrip()
-    where = f" in {row.world}" if row.stratum in ("foreign", "pair") else ""
+    where = f" in {row.world}" if row.stratum in ("foreign", "pair", "table") else ""
     new = f", new on the {row.bed} bed" if row.pair else ""
     return f"{truth}{strength}{where}{new}"
 

@@ -284,18 +284,32 @@ class EffectsObjective:
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
-        """There, with the derivatives of a fit near by, as the way there corrects them."""
-        problem = self._problem
-        raw, own, step = here.raw, here.own, tried.centre - here.centre
-        if step.any():
-            missed = tried.predicted - here.predicted - raw @ step
-            along = step / (step @ step)
-            raw = raw + np.outer(missed, along)
-            own = own + np.outer(whiten(problem.noise, missed), along)
-        elif here.nuisance is problem.nuisance:
-            return self._fitted(tried, raw, own, here.pulled, here.curvature)
-        pulled = problem.nuisance.pulled(own)
-        return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
+        """There, with the derivatives of a fit near by, as the way there corrects them: by a matrix
+        of rank one, Broyden (1965), and so are their products.
+        """
+        problem, step = self._problem, tried.centre - here.centre
+        raw, own, pulled, curvature = here.raw, here.own, here.pulled, here.curvature
+        if here.nuisance is not problem.nuisance:
+            pulled = problem.nuisance.pulled(own)
+            curvature = self._curvature(own, pulled)
+        if not step.any():
+            return self._fitted(tried, raw, own, pulled, curvature)
+
+        along = step / (step @ step)
+        missed = tried.predicted - here.predicted - raw @ step
+        white = whiten(problem.noise, missed)
+        drawn = problem.nuisance.pulled(white)
+        taken = cho_solve((problem.root, True), drawn, check_finite=False)
+        cross = np.outer(own.T @ white - pulled.T @ taken, along)
+        square = float(white @ white - drawn @ taken)
+
+        return self._fitted(
+            tried,
+            raw + np.outer(missed, along),
+            own + np.outer(white, along),
+            pulled + np.outer(drawn, along),
+            curvature + cross + cross.T + square * np.outer(along, along),
+        )
 
     def followed(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with new derivatives by the effects' parameters; those by the constants, which

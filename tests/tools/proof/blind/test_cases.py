@@ -43,7 +43,7 @@ def test_a_batch_holds_every_stratum_in_its_share() -> None:
     assert {a.level for a in drawn if a.stratum == "awkward"} == {a.level for a in strata.AWKWARD}
     for a in drawn:
         assert a.stratum != "two" or a.effects[1] not in alike(a.effects[0])
-        assert a.world == PAPER or a.stratum in ("foreign", "pair")
+        assert a.world == PAPER or a.stratum in ("foreign", "pair", "table")
 
 
 def test_pairs_are_in_every_world_and_a_third_has_nothing_new() -> None:
@@ -58,7 +58,7 @@ def test_pairs_are_in_every_world_and_a_third_has_nothing_new() -> None:
 
 
 def test_what_a_world_has_of_its_own_is_not_new_in_it() -> None:
-    for a in strata.assignments(300, np.random.default_rng(3), ("foreign", "pair")):
+    for a in strata.assignments(300, np.random.default_rng(3), ("foreign", "pair", "table")):
         assert not set(a.effects) & set(HELD[a.world])
         assert "multipass" not in a.effects or a.world != "strips"
 
@@ -205,6 +205,26 @@ def test_a_pair_is_two_campaigns_of_one_rig(tmp_path: Path) -> None:
     places = [str(file.relative_to(tmp_path / "given")) for file in files]
     assert places == [f"{f}/run-{n}.mcap" for f in ("reference", "new") for n in (1, 2)]
     assert len({read(file).run.name for file in files}) == 4
+
+
+def test_tables_hold_the_steady_states_of_a_pair_and_nothing_of_the_course(tmp_path: Path) -> None:
+    (assignment,) = {
+        a
+        for a in strata.assignments(7, np.random.default_rng(1), ("table",), (PAPER,))
+        if a.effects == strata.LUGS and a.level == "strong"
+    }
+    case = cases.drawn(1, 9, assignment)
+    assert cases.detect.LIMIT * strata.LEVELS["strong"] == pytest.approx(case.single[0], rel=0.1)
+
+    before, after = handover.driven(case)
+    files = handover.write(case, [before, after], tmp_path / "given")
+    assert [file.parent.name for file in files] == [handover.REFERENCE, handover.NEW]
+    for file, campaign in zip(files, (before, after), strict=True):
+        table = (tmp_path / "given" / "tables" / f"{campaign.folder}.csv").read_text().splitlines()
+        assert len(table) == 1 + sum(len(run.stretches) for run in campaign.trial.runs)
+        assert read(file).run.steady_states
+    text = (tmp_path / "given" / handover.CONFIGURATION).read_text(encoding="utf-8")
+    assert "grousers" not in text
 
 
 def test_on_the_same_bed_the_soil_is_the_same() -> None:

@@ -25,8 +25,8 @@ SHARES = {
     "two": 0.05,
     "unlisted": 0.08,
     "foreign": 0.10,
-    "pair": 0.19,
-    "table": 0.10,
+    "pair": 0.13,
+    "table": 0.06,
 }
 STRATA = tuple(SHARES)
 # times the detection limit; the strongest is what bends the form of the model most

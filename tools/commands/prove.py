@@ -133,7 +133,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--worlds",
         default="",
         metavar="A,B",
-        help=f"of the strata foreign and pair, some of {','.join(WORLDS)}; default: all",
+        help=f"of the strata foreign, pair and table, some of {','.join(WORLDS)}; default: all",
     )
     parser.add_argument(
         "--output", type=Path, default=OUTPUT, metavar="DIR", help=f"default {OUTPUT}"

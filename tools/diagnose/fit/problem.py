@@ -284,9 +284,7 @@ class EffectsObjective:
         return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
-        """There, with the derivatives of a fit near by, as the way there corrects them: by a matrix
-        of rank one, Broyden (1965), and so are their products.
-        """
+        """There, with a near fit's derivatives, corrected by the way there: Broyden (1965)."""
         problem, step = self._problem, tried.centre - here.centre
         raw, own, pulled, curvature = here.raw, here.own, here.pulled, here.curvature
         if here.nuisance is not problem.nuisance:

@@ -46,6 +46,26 @@ def test_a_fit_of_no_rounds_stands_where_it_is_put() -> None:
     assert fitted.x == pytest.approx([4.5, 0.8])
 
 
+def test_a_fit_near_by_has_the_products_of_its_slopes() -> None:
+    """Also where other terms are allowed than in the fit that it comes from."""
+    base = shifted()
+    free = free_of((PEAK,))
+    fitted = base.problem.descend((PEAK,), free, base.fitted.u, np.array([4.5, 0.8]), rounds=0)
+    terms = form_terms(base.problem.stack, base.problem.noise)
+    for problem in (base.problem, base.problem.with_terms(terms, [0.1] * len(terms))):
+        ground = problem.ground(fitted.effects, fitted.free)
+        for step in (0.0, 0.1):
+            moved = ground.moved(fitted, ground.tried(fitted.centre + step)[0])
+            pulled = problem.nuisance.pulled(moved.own)
+            nuisance = problem.nuisance.gram + np.eye(problem.nuisance.count)
+            fixed = np.diag(moved.penalty[: moved.centre.size] ** 2)
+            left = moved.own.T @ moved.own - pulled.T @ np.linalg.solve(nuisance, pulled)
+            assert np.allclose(moved.pulled, pulled, rtol=1e-9, atol=1e-9 * np.abs(pulled).max())
+            assert np.allclose(moved.curvature, left + fixed, rtol=1e-6)
+            foretold = fitted.predicted + moved.raw @ (moved.centre - fitted.centre)
+            assert np.allclose(moved.predicted, foretold)
+
+
 def test_a_fit_stands_where_its_evidence_is_told() -> None:
     """Beside a gain of the potentiometer, bent far enough, sinkage that grows with slip needs no
     discrepancy of form. A fit with neither of the two would strain the constants, and the evidence

@@ -10,7 +10,8 @@ with one strength,
 linear about the rough fit, reduced to the directions that the recordings can show. The drive, the
 soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
 says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
-keeps its order and its size, but not its phase: each run has its own. A run of larger forces or
+keeps its order and its size, but not its phase: each stretch at a steady speed has its own, as the
+grid has it (orders/on_grid.py), for drives yield and stamps are late. A run of larger forces or
 torques may ripple more in proportion, as a gear does. Soil and rim forget over a length of travel:
 what a channel lacks where it follows the prediction is a sum over lengths a factor of three apart,
 as any memory that fades nearly is. What a run begins with, before soil is sheared and heaped under
@@ -37,6 +38,7 @@ from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, ra
 from gritd.tools.diagnose.fit.ripples import line_waves
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.orders.stretches import GridMotion, Ints, nearest, stretches
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -119,7 +121,7 @@ def _part_of(effect: type[Effect]) -> str:
 
 def rippling_columns(stack: Stack) -> Array:
     """Cosine and sine (N, m) of the ripples that the reference's readings show at their own rate,
-    of the size that they have there; of every run and channel its own.
+    of the size that they have there; of every stretch and channel its own.
     """
     lines = stack.rig.lines
     waves: dict[tuple[int, float], list[tuple[float, Index, Array]]] = {}
@@ -133,10 +135,22 @@ def rippling_columns(stack: Stack) -> Array:
         if known:
             usual = _level(stack, known)
             for size, index, wave in runs:
-                own = np.zeros((stack.size, 2))
-                own[index] = size * max(_level(stack, [index]) / usual, 1.0) * wave
-                columns.append(own)
+                largest = size * max(_level(stack, [index]) / usual, 1.0) * wave
+                stretch = _stretches(stack, index)
+                for number in np.unique(stretch):
+                    own = np.zeros((stack.size, 2))
+                    own[index] = np.where((stretch == number)[:, None], largest, 0.0)
+                    columns.append(own)
     return np.column_stack(columns)
+
+
+def _stretches(stack: Stack, index: Index) -> Ints:
+    """Number of the stretch (n,) at a steady speed that is nearest to each value of one run."""
+    run = stack.rig.runs[int(stack.run[index[0]])]
+    known = run.covariates
+    rim = known["direction"] * known["speed"]
+    motion = GridMotion(run.time, rim, rim * (1.0 - known["slip"]), known["load"])
+    return nearest(stack.time[index], *stretches(motion))
 
 
 def without_ripples(stack: Stack, residual: Array, ripples: Array) -> Array:

@@ -20,6 +20,7 @@ from gritd.tools.diagnose.orders.stretches import (
     GridMotion,
     Ints,
     Series,
+    nearest,
     steady_samples,
     stretches,
 )
@@ -81,11 +82,9 @@ def _weights(
 
 def _nearest(time: Array, begins: Array, ends: Array, motion: GridMotion) -> Ints:
     """The stretch (n,) whose ripple a time (n,) [s] has, −1 where the wheel does not drive."""
-    between = 0.5 * (ends[:-1] + begins[1:])
-    number = np.searchsorted(between, time)
     speed = np.abs(np.nan_to_num(motion.wheel_speed))
     driving = np.interp(time, motion.time, speed) > TUNING.rig.creep * np.median(speed[speed > 0])
-    return np.where(driving, number, -1).astype(np.int64)
+    return np.where(driving, nearest(time, begins, ends), -1)
 
 
 def _wave(line: SpectralLine, angle: Series, time: Array, stretch: Ints, weights: Array) -> Array:

@@ -141,6 +141,11 @@ def stretches(motion: GridMotion) -> tuple[Array, Array]:
     return begins[long], ends[long]
 
 
+def nearest(time: Array, begins: Array, ends: Array) -> Ints:
+    """Number of the stretch (n,) that is nearest to each time (n,) [s]."""
+    return np.searchsorted(0.5 * (ends[:-1] + begins[1:]), time).astype(np.int64)
+
+
 def _steady(motion: GridMotion) -> NDArray[np.bool_]:
     """(n,) the wheel drives one way, settled, and neither a speed nor the load changes."""
     speed, step = motion.wheel_speed, float(np.median(np.diff(motion.time)))

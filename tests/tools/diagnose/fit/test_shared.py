@@ -55,6 +55,19 @@ def test_a_ripple_of_the_reference_is_of_its_size_in_both(order: float) -> None:
     assert 0.2 < loudest < 0.45
 
 
+def test_a_ripple_may_have_another_phase_and_size_at_each_slip() -> None:
+    """A drive yields to its gear, and with it the slip: more so where the wheel turns slowly."""
+    stack, columns = _columns((_ripple(12.0),), 5)
+    slip, angle = stack.covariate("slip"), stack.covariate("wheel_angle")
+    held = np.abs(np.gradient(slip)) < 1e-3
+    driven = np.flatnonzero(stack.of("torque") & (stack.covariate("speed") > 0.0))
+    ripple = ((1.0 + slip) * np.cos(12.0 * angle + slip))[driven]
+
+    weights = np.linalg.lstsq(columns[driven], ripple, rcond=None)[0]
+    left = (ripple - columns[driven] @ weights)[held[driven]]
+    assert np.std(left) < 0.03 * np.std(ripple)
+
+
 def test_less_than_a_turn_shows_a_fast_ripple() -> None:
     """A quarter of a turn holds ten of 40 ripples a turn."""
     stack, columns = _columns((_ripple(40.0),), 5, seconds=14.0)

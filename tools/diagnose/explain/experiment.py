@@ -16,7 +16,7 @@ from math import hypot
 
 import numpy as np
 
-from gritd.estimator.effects.base import EXPERIMENTS, Effect
+from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Location, NextExperiment
 from gritd.tools.diagnose.fit.model import Model
@@ -43,9 +43,9 @@ def next_experiment(
     return _between(search, rivals) if len(rivals) > 1 else None
 
 
-def _proposed(key: str, gain: float, separates: tuple[str, ...]) -> NextExperiment:
+def _proposed(rig: Rig, key: str, gain: float, separates: tuple[str, ...]) -> NextExperiment:
     probability = float(1.0 / (1.0 + np.exp(-gain)))
-    return NextExperiment(key, EXPERIMENTS[key], separates, gain, probability)
+    return NextExperiment(key, rig.words.menu.said[key], separates, gain, probability)
 
 
 # ---- rivals ------------------------------------------------------------------------------------
@@ -69,7 +69,7 @@ def _between(search: EffectSearch, rivals: list[Model]) -> NextExperiment | None
 
     best = max(told, key=lambda k: len(told[k]), default="")
     if best and told[best]:
-        return _proposed(best, float(np.mean(gains[best])), _apart([rivals[0], *told[best]]))
+        return _proposed(rig, best, float(np.mean(gains[best])), _apart([rivals[0], *told[best]]))
     return _by_hand(rig, _apart(rivals))
 
 
@@ -83,7 +83,7 @@ def _by_hand(rig: Rig, names: tuple[str, ...]) -> NextExperiment | None:
     """What the rivals' own files name."""
     keys = (rig.effects[one].confusable_with.get(other) for one in names for other in names)
     key = next(filter(None, keys), None)
-    return _proposed(key, float("nan"), names) if key else None
+    return _proposed(rig, key, float("nan"), names) if key else None
 
 
 # ---- insufficient, and not in the list ---------------------------------------------------------
@@ -105,7 +105,7 @@ def _most_shown(search: EffectSearch) -> NextExperiment | None:
         return None
     least = min(TUNING.screen.sure, median[best])
     told = tuple(n for n, nats in zip(unseen, gains[best], strict=True) if nats >= least)
-    return _proposed(best, median[best], told)
+    return _proposed(rig, best, median[best], told)
 
 
 def _expected(effect: type[Effect]) -> Effect:
@@ -130,7 +130,8 @@ def _along_misfit(
     """
     covariate, q = (location[0].covariate, location[0].q) if location else ("wheel_angle", 1.0)
     gain = -float(np.log(max(q, SQUARE))) / len(rig.runs)
-    return _proposed(rig.words.menu.along.get(covariate, rig.words.menu.otherwise), gain, separates)
+    menu = rig.words.menu
+    return _proposed(rig, menu.along.get(covariate, menu.otherwise), gain, separates)
 
 
 # ---- what is foreseen --------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from math import hypot
 from typing import Any
 
 from gritd.estimator.effects import EFFECTS
-from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strained, strains
@@ -80,7 +79,7 @@ def explain(
         caveats=_caveats(search, decision, redo, location),
         share=decision.share,
         remaining=left,
-        remaining_words=_remaining(decision, bool(far), left, bool(rig.forms)),
+        remaining_words=_remaining(rig, decision, bool(far), left),
         discrepancy=discrepancies(problem, accepted),
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
@@ -125,6 +124,8 @@ def _hypotheses(
     before = [held_out(search.base.fitted, f) for f in every]
     resembled = {of.name: of.model for of in decision.resembled}
     out = []
+    rig = search.problem.stack.rig
+    said = rig.words.menu.said
     for name, probability in _ranked(search, decision):
         models = [m for m in search.models if name in m.names]
         likeliest = max(models, key=lambda m: m.evidence, default=None)
@@ -132,8 +133,6 @@ def _hypotheses(
         best = decision.best if accepted else resembled.get(name, likeliest)
         alike = _alike(decision, name)
         forms = best.form_share(name) if best else 0.0
-        rig = search.problem.stack.rig
-
         out.append(
             Hypothesis(
                 effect=name,
@@ -145,7 +144,7 @@ def _hypotheses(
                 sentence=EFFECTS[name].sentence(),
                 equation=EFFECTS[name].equation(),
                 score_nats=search.first.evidence.get(name, 0.0),
-                separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
+                separated_by={r: said[k] for r in alike if (k := _key(name, r)) is not None},
                 other_forms=forms,
                 profile=profile_of(search.problem, best, name) if best else {},
             )
@@ -267,20 +266,18 @@ def _caveats(
     )
 
 
-def _remaining(
-    decision: Decision, strained: bool, left: Mapping[str, Remainder], formed: bool
-) -> str:
+def _remaining(rig: Rig, decision: Decision, strained: bool, left: Mapping[str, Remainder]) -> str:
     """strained: whether constants are far from what is known of them; left: what the equations and
-    the accepted names miss of each channel; formed: whether the rig has a discrepancy of form.
+    the accepted names miss of each channel.
     """
     if decision.beside is not None:
-        kinds = dict.fromkeys(described(f.shape) for f in decision.beside.functions)
+        kinds = dict.fromkeys(described(f.shape, rig.units) for f in decision.beside.functions)
         return f"Something without a name remains: {', '.join(kinds)}."
 
     quiet = decision.verdict in QUIET
     missed = [words for c, each in left.items() if (words := missed_words(c, each, not quiet))]
     if missed:
-        without = "Without its discrepancy of form, the model" if formed else "The model"
+        without = "Without its discrepancy of form, the model" if rig.forms else "The model"
         return f"{without} misses {listed(missed)}."
     if strained:
         return "Nothing above the noise remains but what strained constants take up."

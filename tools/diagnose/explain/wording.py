@@ -7,7 +7,7 @@ out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -35,12 +35,11 @@ AT = {  # a value of a covariate, in words
     "velocity": "{}",
     "load": "{} load",
     "sinkage": "{} sinkage",
-    "position": "{} along the bed",
     "time": "{} from the start",
     "heat": "∫I² dt of {}",
     "acceleration": "{}",
 }
-PLACES = {"time": "over time", "position": "along the bed"}
+PLACES = ("time", "position")
 TIMES = {1: "once", 2: "twice"}
 OSCILLATES = "oscillates with a period of"
 
@@ -55,13 +54,16 @@ def label(candidate: Candidate) -> str:
     return along if candidate.kind == "smooth" else f"{along} {candidate.kind}"
 
 
-def described(shape: Shape) -> str:
-    """A misfit without a name in words: `a step in drawbar pull along the bed`."""
+def described(shape: Shape, units: Mapping[str, str]) -> str:
+    """A misfit without a name in words: `a step in drawbar pull along the bed`; units: of the
+    rig's covariates.
+    """
     if shape.along == ("constant",):
         return f"an offset of {spelled(shape.channel)}"
     if shape.along == ("run",):
         return f"a change in {spelled(shape.channel)} from run to run"
-    where = " and ".join(PLACES.get(name, f"with {spelled(name)}") for name in shape.along)
+    ways = {"time": "over time", "position": _along(units)}
+    where = " and ".join(ways.get(name, f"with {spelled(name)}") for name in shape.along)
     kind = "smooth change" if shape.kind == "smooth" else shape.kind
     return f"a {kind} in {spelled(shape.channel)} {where}"
 
@@ -105,10 +107,22 @@ def value_of(stack: Stack, covariate: str, value: float) -> str:
     """A value of a covariate in words, such as `30 % slip`."""
     unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
     digits = 3 if covariate in PLACES else 2
-    return AT.get(covariate, "{}").format(spaced(value * factor, unit, digits))
+    return _at(stack, covariate).format(spaced(value * factor, unit, digits))
 
 
 # ---- pieces ------------------------------------------------------------------------------------
+
+
+def _along(units: Mapping[str, str]) -> str:
+    """What a position lies along: the bed, or the turn of a drive without soil."""
+    return "along the bed" if units["position"] == "m" else "along the turn"
+
+
+def _at(stack: Stack, covariate: str) -> str:
+    """How a value of a covariate is said, `{}` in its place."""
+    if covariate == "position":
+        return f"{{}} {_along(stack.rig.units)}"
+    return AT.get(covariate, "{}")
 
 
 def _started(words: str) -> str:
@@ -131,7 +145,7 @@ def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
     length = spaced(factor / at, unit, 3)
     if axis == "time":
         return f"{OSCILLATES} {length}, {amplitude}"
-    return f"waves of {length} along the bed, {amplitude}"
+    return f"waves of {length} {_along(stack.rig.units)}, {amplitude}"
 
 
 class _Where:
@@ -179,7 +193,7 @@ class _Where:
         at = self._apart(covariate, [float(x[parts[k]].mean()) for k in shown])
         first, *rest = (self._say((low, middle, high)[k]) for k in shown)
         others = (f"{_brief(say)} at {v}" for say, v in zip(rest, at[1:], strict=True))
-        return ", ".join([f"{first} at {AT.get(covariate, '{}').format(at[0])}", *others])
+        return ", ".join([f"{first} at {_at(self._stack, covariate).format(at[0])}", *others])
 
     def _apart(self, covariate: str, values: Sequence[float]) -> list[str]:
         """Values of a covariate, to a hundredth of what they differ by, or as whole numbers."""

@@ -23,7 +23,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.limits import limits, raised
 from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Balanced, Motion, Sensed, advanced, situation_of
@@ -52,6 +52,13 @@ MOVED = ("wheel_angle", "velocity", "acceleration")
 LOADS = ("inertia", "damping", "weight_sin", "weight_cos")  # torques in proportion to something
 NAMED = ("constant", "direction", "velocity", "acceleration")  # what is fitted, or has a name
 UNITS = WHEEL_UNITS | {"speed": "rad/s", "position": "rad"}
+WITHOUT_SOIL = EXPERIMENTS | {  # what is said in other words of a drive that no wheel is on
+    "lifted_spin": "turn the drive at several speeds, both ways, without its load",
+    "reversal": "turn the drive back over the same angles at the same speed",
+    "speed_step": "step the speed under one load",
+    "second_pass": "repeat the same motion",
+    "shifted_start": "start at another angle",
+}
 
 
 def drive_rig(
@@ -74,7 +81,9 @@ def drive_rig(
         effects={n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE},
         new=[True for _ in names],
         predict=model.predict,
-        words=RigWords((CAVEAT,), replace(MENU, driven=())),
+        words=RigWords(
+            (CAVEAT,), replace(MENU, driven=(), otherwise="speed_step", said=WITHOUT_SOIL)
+        ),
         smooth=SMOOTH,
         forms=(_form(runs),),
         named=[

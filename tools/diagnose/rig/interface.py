@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import ConfiguredEffect
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.model.discrepancy import Usual
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
@@ -106,11 +106,13 @@ class Menu:
     driven:    those that a rig may foresee, the least effort first.
     along:     of a covariate, the experiment that shows the shape of a misfit along it.
     otherwise: the experiment where none of these does.
+    said:      every experiment in words.
     """
 
     driven: tuple[str, ...]
     along: Mapping[str, str]
     otherwise: str
+    said: Mapping[str, str] = field(default_factory=lambda: EXPERIMENTS)
 
 
 @dataclass(frozen=True)

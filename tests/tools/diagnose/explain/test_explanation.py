@@ -23,10 +23,11 @@ def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool, ve
         "torque": Remainder(0.001, "N·m", "within the noise"),
         "sinkage": Remainder(0.0046, "m", "−2.8 mm at 5 % slip, +6.8 mm at 49 % slip"),
     }
-    shown = _remaining(decision, False, left, formed)
+    rig: Any = SimpleNamespace(forms=("soil",) if formed else (), units={})
+    shown = _remaining(rig, decision, False, left)
     who = "Without its discrepancy of form, the model" if formed else "The model"
     assert shown == (f"{who} misses sinkage by 4.6 mm (−2.8 mm at 5 % slip, +6.8 mm at 49 % slip).")
-    nothing = _remaining(decision, False, {}, formed)
+    nothing = _remaining(rig, decision, False, {})
     assert ("noise" in nothing) == (verdict == "explained"), "a misfit that constants take up"
 
 

@@ -17,6 +17,7 @@ SOURCES = crc32(b"".join(file.read_bytes() for file in FILES))
 NOT_FUSED = "-ffp-contract=off"
 FLAGS = {
     "algebra": [NOT_FUSED],
+    "balance": [],
     "checksum": [],
     "closed": [NOT_FUSED, "-fno-builtin-sin", "-fno-builtin-cos"],
     "innovations": [NOT_FUSED],

@@ -63,7 +63,57 @@ static PyObject *fill(PyObject *self, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
+/* Gains (2, n) and variances (n) of the innovations of one colour, unit noise beside `white`. */
+static void recursion(const double *kept, double shared_slow, double shared_fast,
+                      const double *white, Py_ssize_t length, Py_ssize_t colours, double *gain,
+                      double *variance) {
+    const Py_ssize_t second = length * colours;
+    double ss = shared_slow, ff = shared_fast, sf = 0.0 * shared_slow;
+    for (Py_ssize_t i = 0; i < second; i += colours) {
+        const double a = kept[i], b = kept[second + i];
+        ss = a * a * ss + shared_slow * (1 - a * a);
+        ff = b * b * ff + shared_fast * (1 - b * b);
+        sf = a * b * sf;
+        const double to_slow = ss + sf, to_fast = ff + sf, total = to_slow + to_fast + white[i];
+        const double by_slow = to_slow / total, by_fast = to_fast / total;
+        gain[i] = by_slow;
+        gain[second + i] = by_fast;
+        variance[i] = total;
+        ss -= to_slow * by_slow;
+        ff -= to_fast * by_fast;
+        sf -= to_slow * by_fast;
+    }
+}
+
+static PyObject *gains(PyObject *self, PyObject *arguments) {
+    enum { KEPT_IN, SHARE, WHITE, GAINS, VARIANCE, ALL };
+    Py_buffer held[ALL];
+    Py_ssize_t length, colours;
+    if (!PyArg_ParseTuple(arguments, "y*y*y*w*w*nn", &held[KEPT_IN], &held[SHARE], &held[WHITE],
+                          &held[GAINS], &held[VARIANCE], &length, &colours))
+        return NULL;
+
+    const Py_ssize_t every = length * colours;
+    const Py_ssize_t sizes[ALL] = {2 * every, 2 * colours, every, 2 * every, every};
+    int fits = length >= 0 && colours >= 0;
+    double *at[ALL];
+    for (int k = 0; k < ALL; k++) {
+        fits = fits && held[k].len == sizes[k] * (Py_ssize_t)sizeof(double);
+        at[k] = held[k].buf;
+    }
+    for (Py_ssize_t c = 0; fits && c < colours; c++)
+        recursion(at[KEPT_IN] + c, at[SHARE][c], at[SHARE][colours + c], at[WHITE] + c, length,
+                  colours, at[GAINS] + c, at[VARIANCE] + c);
+    for (int k = 0; k < ALL; k++) PyBuffer_Release(&held[k]);
+    if (!fits) {
+        PyErr_SetString(PyExc_ValueError, "arrays do not fit their sizes");
+        return NULL;
+    }
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
+    {"gains", gains, METH_VARARGS, "gains(kept, share, white, gain, variance, length, colours)"},
     {"fill", fill, METH_VARARGS,
      "fill(columns, kept, gain, scale, slow, fast, out, length, colours, width, first, rows)"},
     {NULL, NULL, 0, NULL}};

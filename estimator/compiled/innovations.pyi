@@ -18,3 +18,13 @@ def fill(
     rows: int,
     /,
 ) -> None: ...
+def gains(
+    kept: Array,  # (2, n, g) contiguous, slow and fast
+    share: Array,  # (2, g)
+    white: Array,  # (n, g)
+    gain: Array,  # (2, n, g)
+    variance: Array,  # (n, g)
+    length: int,
+    colours: int,
+    /,
+) -> None: ...

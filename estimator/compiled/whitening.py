@@ -10,10 +10,10 @@ try:
     from gritd.estimator.compiled import innovations
 
     check_sources(innovations)
-    from gritd.estimator.compiled.innovations import fill
+    from gritd.estimator.compiled.innovations import fill, gains
 except ImportError:  # no compiler where gritd was installed
     BUILT = False
 else:
     BUILT = True
 
-__all__ = ["BUILT", "fill"]
+__all__ = ["BUILT", "fill", "gains"]

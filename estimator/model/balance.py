@@ -8,15 +8,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.compiled import balancing
 from gritd.estimator.stages.situation import ContactLaw
-from gritd.estimator.terramechanics.original import OriginalForces, forces
+from gritd.estimator.terramechanics.original import (
+    OriginalForces,
+    forces,
+    janosi,
+    nodes,
+    velocity_ratio,
+)
 from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
 # nodes a zone: W, DP and T/r within 3e-7 of W when driving, 2e-5 down to 10 % braking
 # (test_forward.py)
 ORDER = 8
 TOLERANCE = 1e-9  # relative difference of W from the load at which θ₁ is accepted
-FINE = 1e-8  # the same from a solution near by, whose forces are then right to about as much
+FINE = 1e-11  # the same from a solution near by: differences between the two mean something
 CHUNK = 1024  # samples solved together: their nodes stay in the processor's cache
 DEEPEST = 1.5  # [rad] a wheel sunk to its axle is bogged; θ₁ stops here and the sample is flagged
 TOP = np.log(DEEPEST)
@@ -40,7 +47,7 @@ class Contact(NamedTuple):
 class Balance(NamedTuple):
     theta_1: Array  # [rad]
     forces: OriginalForces  # at θ₁, each (n,)
-    overloaded: Array  # bool: the load exceeds what the soil carries; forces are those at DEEPEST
+    overloaded: Bools  # the load exceeds what the soil carries; forces are those at DEEPEST
     slope: Array  # d ln W / d ln θ₁ as the steps to θ₁ saw it
 
 
@@ -110,11 +117,45 @@ def _solve_chunk(wheel: Wheel, contact: Contact, near: Balance | None, order: in
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
         guess, steep = (np.broadcast_to(a, load.shape)[touching] for a in (theta_1, slope))
-        solved = _iterate(wheel, _take(contact, touching), guess, steep, order, near is not None)
+        ways = _compiled if balancing.BUILT and _is_original(contact.law) else _iterate
+        solved = ways(wheel, _take(contact, touching), guess, steep, order, near is not None)
         out[:, touching] = np.vstack(
             (solved.theta_1, *solved.forces, solved.overloaded, solved.slope)
         )
     return Balance(out[0], OriginalForces(*out[1:-2]), out[-2] > 0.0, out[-1])
+
+
+def _is_original(law: ContactLaw) -> bool:
+    """Whether the stress is that of the paper, under a wheel that points where it goes."""
+    return law.mobilisation is janosi and not np.any(law.side_slip)
+
+
+def _compiled(
+    wheel: Wheel, contact: Contact, guess: Array, slope: Array, order: int, near: bool
+) -> Balance:
+    """What `_iterate` finds, by C: estimator/compiled/balance.c."""
+    soil, law = contact.soil, contact.law
+    of_samples = (
+        soil.cohesion * law.strength * law.adhesion,
+        soil.tan_phi * law.strength * law.friction,
+        soil.shear_modulus,
+        soil.exponent,
+        soil.modulus,
+        np.clip(law.theta_m_ratio, 0.0, 1.0),
+        law.theta_2_ratio,
+        velocity_ratio(contact.slip),
+        contact.load,
+        guess,
+        slope,
+    )
+    given = np.stack(np.broadcast_arrays(*of_samples))
+
+    found, fine = np.empty((7, guess.size)), FINE if near else 0.0
+    ends = SHALLOWEST, DEEPEST, TOLERANCE, fine, ROUNDS
+    balancing.solve(given, found, nodes(order), guess.size, order, wheel.radius, wheel.width, *ends)
+    theta_1, pull, load, torque, resistance, overloaded, steepness = found
+    forces = OriginalForces(pull, load, torque, resistance, np.zeros(guess.size))
+    return Balance(theta_1, forces, overloaded > 0.0, steepness)
 
 
 def _iterate(

@@ -47,7 +47,9 @@ class Response:
 
     slip: Array  # true i [-]
     theta_1: Array  # [rad]
-    overloaded: Array  # bool: the load exceeds what the soil carries, θ₁ is held at balance.DEEPEST
+    overloaded: (
+        balance.Bools
+    )  # the load exceeds what the soil carries, θ₁ is held at balance.DEEPEST
     sinkage: Array  # of the axle [m]
     drawbar_pull: Array  # [N]
     load: Array  # [N]
@@ -132,7 +134,7 @@ def carried_at(
         *(low + share * (high - low) for low, high in zip(bare, stated, strict=True))
     )
     none = np.zeros(theta_1.shape)
-    return Carried(wheel, situation, balance.Balance(theta_1, forces, none, none))
+    return Carried(wheel, situation, balance.Balance(theta_1, forces, none > 0.0, none))
 
 
 def touched(

@@ -159,7 +159,7 @@ def contact(
     """
     peak = _peak(wheel, slip, theta_1) if theta_m is None else theta_m
     shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
-    s, ds = (values.reshape(-1, *(1 for _ in shape)) for values in _nodes(order))
+    s, ds = (values.reshape(-1, *(1 for _ in shape)) for values in nodes(order))
     front, rear = theta_1 - s * (theta_1 - peak), theta_2 + s * (peak - theta_2)
     points = arc(theta_1, np.concatenate(np.broadcast_arrays(rear, front)))
     weight = np.concatenate(np.broadcast_arrays(ds * (peak - theta_2), ds * (theta_1 - peak)))
@@ -218,13 +218,13 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 @cache
-def _nodes(order: int) -> tuple[Array, Array]:
-    """Nodes and weights on s ∈ [0, 1], where s = 0 is the stress-free end of a zone and s = 1 is
-    θₘ.
+def nodes(order: int) -> Array:
+    """Nodes and weights (2, order) on s ∈ [0, 1], where s = 0 is the stress-free end of a zone and
+    s = 1 is θₘ.
 
     Gauss-Legendre in t with s = t³: stress starts as sⁿ, which is t³ⁿ and so smooth enough for any
     n of a soil.
     """
     t, weight = np.polynomial.legendre.leggauss(order)
     t = 0.5 * (t + 1.0)
-    return t**3, 1.5 * weight * t**2
+    return np.stack((t**3, 1.5 * weight * t**2))

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, optimize
 
+from gritd.estimator.compiled import balancing
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.model import balance, forward
 from gritd.estimator.model.balance import Contact
@@ -157,6 +158,31 @@ def test_at_the_balances_entry_angle_any_modulus_gives_its_forces(effect: str) -
     response = forward.responded(solved, effects)
     np.testing.assert_allclose(reaction.torque, response.torque, rtol=1e-6)
     np.testing.assert_allclose(reaction.drawbar_pull, response.drawbar_pull, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.skipif(not balancing.BUILT, reason="gritd was installed without a compiler")
+@pytest.mark.parametrize("order", [5, balance.ORDER])
+@pytest.mark.parametrize("begun", [True, False])
+def test_compiled_balances_are_those_of_numpy(
+    monkeypatch: pytest.MonkeyPatch, begun: bool, order: int
+) -> None:
+    """In the air, braking, bogged, behind the axle, and with the peak at either end."""
+    rng = np.random.default_rng(8)
+    spread = np.exp(0.5 * rng.standard_normal((6, 300)))
+    soil = Soil(1000.0 * spread[0], 0.6, 0.02 * spread[1], 1.0 * spread[2] ** 0.3, 1e6 * spread[3])
+    law = ContactLaw(rng.uniform(-0.1, 1.1, 300), rng.uniform(-0.1, 0.2, 300), 1.1, 0.9, spread[4])
+    load = np.where(rng.random(300) < 0.1, 0.0, 100.0 * spread[5] ** 3)
+    contact = Contact(soil, law, rng.uniform(-0.3, 0.9, 300), load)
+    near = balance.solve(WHEEL, contact._replace(load=1.1 * load)) if begun else None
+
+    compiled = balance.solve(WHEEL, contact, near, order)
+    monkeypatch.setattr(balancing, "BUILT", False)
+    by_numpy = balance.solve(WHEEL, contact, near, order)
+
+    assert by_numpy.overloaded.any() and not by_numpy.overloaded.all()
+    np.testing.assert_array_equal(compiled.overloaded, by_numpy.overloaded)
+    np.testing.assert_allclose(compiled.theta_1, by_numpy.theta_1, rtol=1e-10)
+    np.testing.assert_allclose(np.array(compiled.forces), np.array(by_numpy.forces), atol=1e-8)
 
 
 def test_samples_do_not_depend_on_their_neighbours() -> None:

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -225,17 +224,22 @@ def _recursion(
     own = np.zeros(len(gaps)) if beside is None else beside
 
     fast_kept = np.exp(-gaps / (TUNING.noise.fast_time * step))
-    kept = np.stack([[c.kept(gaps, step), fast_kept] for c in colours], axis=-1)
+    slow_kept = np.stack([c.kept(gaps, step) for c in colours], axis=-1)
+    kept = np.stack((slow_kept, np.broadcast_to(fast_kept[:, None], slow_kept.shape)))
+    white = 1.0 - share.sum(axis=0) + (own if own.ndim > 1 else own[:, None])
     gain, variance = np.empty_like(kept), np.empty(kept.shape[1:])
-    decays: Any = kept.swapaxes(0, 1)
-    slow, fast = share[0], share[1]
-    white: Any = 1.0 - share.sum(axis=0) + (own if own.ndim > 1 else own[:, None])
-    if len(colours) == 1:  # floats take less time than arrays of one, with the same bits
-        decays, white = decays[..., 0].tolist(), white[:, 0].tolist()
-        slow, fast = (part.item() for part in (slow, fast))
-    ss, ff, sf = slow, fast, 0.0 * slow
+    if whitening.BUILT:
+        whitening.gains(kept, share, white, gain, variance, len(gaps), len(colours))
+    else:
+        _gains(kept, share, white, gain, variance)
+    return kept[..., None], gain[..., None], np.maximum(np.sqrt(variance), SLIGHT)
 
-    for i, ((a, b), alone) in enumerate(zip(decays, white, strict=True)):
+
+def _gains(kept: Array, share: Array, white: Array, gain: Array, variance: Array) -> None:
+    """Fills gains (2, n, g) and variances (n, g): compiled/innovations.c with the same bits."""
+    slow, fast = share
+    ss, ff, sf = slow, fast, 0.0 * slow
+    for i, ((a, b), alone) in enumerate(zip(kept.swapaxes(0, 1), white, strict=True)):
         ss, ff = a * a * ss + slow * (1 - a * a), b * b * ff + fast * (1 - b * b)
         sf = a * b * sf
         to_slow, to_fast = ss + sf, ff + sf
@@ -243,7 +247,6 @@ def _recursion(
         by_slow, by_fast = to_slow / total, to_fast / total
         gain[0, i], gain[1, i], variance[i] = by_slow, by_fast, total
         ss, ff, sf = ss - to_slow * by_slow, ff - to_fast * by_fast, sf - to_slow * by_fast
-    return kept[..., None], gain[..., None], np.maximum(np.sqrt(variance), SLIGHT)
 
 
 def step_of(gaps: Array) -> float:

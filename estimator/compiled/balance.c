@@ -18,17 +18,17 @@ typedef struct {
 } Rule;
 
 /* One zone: from its free end `from` towards θₘ over `width` [rad]; front finds σ, rear has it. */
-static void zone(const Rule *rule, const double *s, double theta_1, double from, double width,
+static void zone(const Rule *rule, const double *s, const double *at, double from, double width,
                  int front, double *sigma, double *force) {
-    const double sine_1 = sin(theta_1), cosine_1 = cos(theta_1), r = rule->radius;
+    const double theta_1 = at[0], sine_1 = at[1], cosine_1 = at[2], r = rule->radius;
     for (Py_ssize_t i = 0; i < rule->order; i++) {
         const double turned = theta_1 - (from + rule->node[i] * width);
-        const double u = tan(0.5 * turned), q = 2.0 * u / (1.0 + u * u); /* sin(θ₁ − θ) */
-        const double drop = q * (sine_1 - cosine_1 * u), advance = q * (cosine_1 + sine_1 * u);
+        const double q = sin(turned), v = q * q / (1.0 + cos(turned)); /* v: 1 − cos(θ₁ − θ) */
+        const double drop = q * sine_1 - v * cosine_1, advance = q * cosine_1 + v * sine_1;
         if (front) sigma[i] = s[MODULUS] * pow(r * fmax(drop, 0.0), s[EXPONENT]); /* Eq. (3) */
 
         const double x = r * (turned - s[SPEED] * advance) / s[SHEAR];          /* Eq. (6) */
-        const double share = copysign(expm1(-fabs(x)), x);                      /* Eq. (2) */
+        const double share = copysign(1.0 - exp(-fabs(x)), x);                  /* Eq. (2) */
         const double area = r * rule->width * rule->weight[i] * (front ? -width : width);
         const double normal = area * sigma[i];
         const double shear = area * (s[COHESION] + sigma[i] * s[TAN_PHI]) * share; /* Eq. (7) */
@@ -43,10 +43,11 @@ static void zone(const Rule *rule, const double *s, double theta_1, double from,
 /* DP, W, T and resistance at θ₁, Eqs. (8)-(10). */
 static void forces(const Rule *rule, const double *s, double theta_1, double *force) {
     double sigma[MOST];
+    const double at[] = {theta_1, sin(theta_1), cos(theta_1)};
     const double peak = s[PEAK] * theta_1, rear = -s[REAR] * theta_1;
     for (int k = 0; k < 4; k++) force[k] = 0.0;
-    zone(rule, s, theta_1, theta_1, peak - theta_1, 1, sigma, force);
-    zone(rule, s, theta_1, rear, peak - rear, 0, sigma, force);
+    zone(rule, s, at, theta_1, peak - theta_1, 1, sigma, force);
+    zone(rule, s, at, rear, peak - rear, 0, sigma, force);
     force[0] -= force[3];
 }
 

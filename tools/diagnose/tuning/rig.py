@@ -25,7 +25,7 @@ class RigTuning:
 
     # --- campaign.py ---
     quadrature_order: int = tuned(
-        5, "nodes", "of a zone of the contact: leaves 1e-4 of the torque", "convergence of torque"
+        6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
     )
 
     # --- constants.py ---

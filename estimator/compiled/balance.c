@@ -69,7 +69,8 @@ static void balance(const Rule *rule, const double *s, double *found) {
     for (Py_ssize_t round = 0; round < rule->rounds; round++) {
         here[X] = x;
         forces(rule, s, exp(x), here + FORCES);
-        here[MISS] = log(fmax(here[FORCES + 1] / s[LOAD], 1e-30));
+        const double ratio = here[FORCES + 1] / s[LOAD]; /* what is no number stays none */
+        here[MISS] = log(ratio < 1e-30 ? 1e-30 : ratio);
         const double secant = (here[MISS] - before[MISS]) / (x - before[X]);
         if (secant > 0.2 && secant < 20.0) slope = secant;
         if (here[MISS] < 0.0) low = x;
@@ -82,7 +83,7 @@ static void balance(const Rule *rule, const double *s, double *found) {
         if (done || bogged || !(high - low > 1e-15)) break;
 
         for (int k = 0; k < POINT; k++) before[k] = here[k];
-        const double step = fmin(x - here[MISS] / slope, top);
+        const double beyond = x - here[MISS] / slope, step = beyond > top ? top : beyond;
         x = step > low && step < high ? step : 0.5 * (low + fmin(high, top));
     }
 

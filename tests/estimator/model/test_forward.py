@@ -185,6 +185,17 @@ def test_compiled_balances_are_those_of_numpy(
     np.testing.assert_allclose(np.array(compiled.forces), np.array(by_numpy.forces), atol=1e-8)
 
 
+@pytest.mark.parametrize("built", [False, True])
+def test_what_is_no_number_gives_no_number(monkeypatch: pytest.MonkeyPatch, built: bool) -> None:
+    """An effect may run away: its neighbours are not touched, and nothing is made up for it."""
+    monkeypatch.setattr(balancing, "BUILT", built and balancing.BUILT)
+    slip, load = np.full(3, 0.2), np.full(3, 60.0)
+    slip[1] = np.nan
+    found = balance.solve(WHEEL, Contact(SOIL, ContactLaw(0.5), slip, load))
+    np.testing.assert_allclose(found.forces.load[[0, 2]], 60.0, rtol=1e-8)
+    assert np.isnan(found.forces.drawbar_pull[1])
+
+
 def test_samples_do_not_depend_on_their_neighbours() -> None:
     slip, load = (
         np.linspace(0.0, 0.8, 3 * balance.CHUNK),

@@ -9,15 +9,15 @@ With the evidence Z of each,
 The chance of a likelihood ratio above R by noise alone is 1/R at most (Markov's inequality), so
 ln 100 is an alarm that is false once in a hundred campaigns. An effect is tried beside the exact
 model too. Where δ is known to be there, as the configuration holds one that was learnt or a
-reference campaign shows it, the alarm is that of effects and the unexplained against Z_δ, and must
-be more than what the runs of the reference would raise (usual.py). Without a reference, which shows
+reference campaign shows it, the alarm is that of effects and the unexplained against Z_δ, each less
+what the runs of the reference would raise of its kind (usual.py). Without a reference, which shows
 the noise, something of it must be more than noise of any colour as well (open_colour.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -37,7 +37,7 @@ from gritd.tools.diagnose.screen.evidence import Pass, one_pass
 from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
-from gritd.tools.diagnose.screen.usual import unnamed_in_both, usual
+from gritd.tools.diagnose.screen.usual import EFFECTS, UNEXPLAINED, kinds_of, unnamed_in_both, usual
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -102,7 +102,8 @@ class Screen:
     formed: whether its discrepancy is none of the alarm.
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     strain: [σ] of the constant that stands farthest from what is known of it, and its name.
-    usual:  what a run of a reference would raise [nats] (usual.py).
+    kind:   of every effect beside a reference; else all are of one.
+    usual:  of every kind what a run of a reference would raise [nats] (usual.py).
     open:   the largest log Bayes factor of what stands out with the noise's colour open [nats].
     """
 
@@ -112,7 +113,8 @@ class Screen:
     formed: bool
     ripple: float
     strain: float
-    usual: float = 0.0
+    kind: Mapping[str, str] = field(default_factory=dict)
+    usual: Mapping[str, float] = field(default_factory=dict)
     constant: str = ""
     open: float = np.inf
 
@@ -135,17 +137,24 @@ class Screen:
 
     @property
     def kinds(self) -> dict[str, float]:
-        """Mean log evidence of every kind of explanation that is not the exact model [nats]."""
-        alone, names = self.effects.alone, list(self.effects.effects)
-        exact = [self.exact + self.effects.exact(name) for name in names]
+        """Mean log evidence of every kind of explanation that is not the exact model, less what is
+        usual of the kind [nats].
+        """
+        alone = self.effects.alone
         kinds = {
             "form": [alone],
-            "effects": [self.effects.evidence(name) for name in names],
-            "unexplained": [alone + value for value in self.unexplained.values()],
+            UNEXPLAINED: [alone + value for value in self.unexplained.values()],
         }
-        if not self.formed:
-            kinds["effects of the exact"] = exact
-        return {k: float(log_sum(each)) - np.log(len(each)) for k, each in kinds.items() if each}
+        for name in self.effects.effects:
+            kinds.setdefault(self._kind(name), []).append(self.effects.evidence(name))
+            if not self.formed:
+                exact = self.exact + self.effects.exact(name)
+                kinds.setdefault("effects of the exact", []).append(exact)
+        means = {k: float(log_sum(each)) - np.log(len(each)) for k, each in kinds.items() if each}
+        return {k: mean - self.usual.get(k, 0.0) for k, mean in means.items()}
+
+    def _kind(self, name: str) -> str:
+        return self.kind.get(name, EFFECTS)
 
     @property
     def largest(self) -> Candidate:
@@ -158,17 +167,18 @@ class Screen:
     @property
     def threshold(self) -> float:
         """What the alarm must reach [nats]."""
-        return self.usual - float(np.log(TUNING.screen.level))
+        return -float(np.log(TUNING.screen.level))
 
-    def seen(self, evidence: float) -> bool:
-        """Whether one effect of so much evidence would be an alarm."""
-        count = len(self.kinds) * max(len(self.effects.effects), 1)
-        return evidence > self.threshold + float(np.log(count))
+    def seen(self, name: str, evidence: float) -> bool:
+        """Whether an effect of so much evidence would be an alarm."""
+        kind = self._kind(name)
+        count = len(self.kinds) * sum(self._kind(other) == kind for other in self.effects.effects)
+        return evidence - self.usual.get(kind, 0.0) > self.threshold + float(np.log(count))
 
     @property
     def p(self) -> float:
         """The largest chance that noise alone could give of what is seen."""
-        beyond = max(self.ratio - self.usual, 0.0)
+        beyond = max(self.ratio, 0.0)
         open_ = min(TUNING.screen.kinds * float(np.exp(-max(self.open, 0.0))), 1.0)
         return float(min(max(np.exp(-beyond), open_), self.ripple, self.strained))
 
@@ -203,8 +213,9 @@ def screen(screening: Screening, bare: Model, jobs: int = 1) -> Screen:
     ripple = min((line.p for line in rig.lines.fresh()), default=1.0)
     strained = bare if formed else screening.base
     strain, constant = strain_of(problem, strained)
-    shown = usual(problem, bare, effects) if problem.stack.referred else 0.0
-    found = Screen(effects, unexplained, exact, formed, ripple, strain, shown, constant)
+    found = Screen(effects, unexplained, exact, formed, ripple, strain, constant=constant)
+    if problem.stack.referred:
+        found = replace(found, kind=kinds_of(rig), usual=usual(problem, bare, effects))
     if not found.on_grid or problem.stack.referred or rig.tabled:
         return found
     return replace(found, open=_open(screening, bare, found, jobs))

@@ -2,7 +2,8 @@
 
 Beside a reference, what is new must be more than a rig that is a little off its model anyway. How
 much that is its own runs show: every run of it is judged as if it alone were new, by the effects
-and functions that the new campaign is judged by, which itself says nothing of it. Runs that are off
+and functions that the new campaign is judged by, which itself says nothing of it. What is usual of
+the soil says nothing of the drive: each kind is held against its own. Runs that are off
 each in its own way do not add up: of n runs whose strengths scatter about nought the common one is
 as many σ from it as that of a single run.
 """
@@ -22,23 +23,33 @@ from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.noise.colour import whiten
-from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.interface import Bools, Rig
 from gritd.tools.diagnose.screen.evidence import Pass
 from gritd.tools.diagnose.screen.gram import Gram
 from gritd.tools.diagnose.screen.scans import Family, families, without_harmonics
 from gritd.tools.diagnose.tuning import TUNING
 
+DRIVE, EFFECTS, UNEXPLAINED = "effects of the drive", "effects", "unexplained"
 
-def usual(problem: Problem, model: Model, first: Pass) -> float:
-    """The largest log likelihood ratio of a run of the reference [nats, 0 at least].
+
+def kinds_of(rig: Rig) -> dict[str, str]:
+    """Of every effect, what kind of explanation it is: of the drive, or any other."""
+    return {n: DRIVE if e.stage == "drivetrain" else EFFECTS for n, e in rig.effects.items()}
+
+
+def usual(problem: Problem, model: Model, first: Pass) -> dict[str, float]:
+    """Of every kind of explanation the largest log likelihood ratio of a run of the reference
+    [nats, 0 at least].
 
     first: of the effects in the new campaign, whose likeliest shapes are tried.
     """
-    stack = problem.stack
+    stack, kinds = problem.stack, kinds_of(problem.stack.rig)
     runs = [stack.run == number for number in np.flatnonzero(~np.array(stack.rig.new))]
-    effects = _of_effects(problem, model, first, runs)
-    smooth = _of_functions(problem, model, runs)
-    return float(np.max(np.logaddexp(effects, smooth) - np.log(2.0), initial=0.0))
+    every = {UNEXPLAINED: [_of_functions(problem, model, runs)]}
+    for name, own in _of_effects(problem, model, first, runs):
+        every.setdefault(kinds[name], []).append(own)
+    means = {kind: log_sum(each) - np.log(len(each)) for kind, each in every.items()}
+    return {kind: float(np.max(mean, initial=0.0)) for kind, mean in means.items()}
 
 
 def unnamed_in_both(
@@ -70,11 +81,12 @@ def unnamed_in_both(
     return _mean(gains) if gains else -np.inf
 
 
-def _of_effects(problem: Problem, model: Model, first: Pass, runs: Sequence[Bools]) -> Array:
-    """Log mean Bayes factor (r,) of the effects in each run."""
+def _of_effects(
+    problem: Problem, model: Model, first: Pass, runs: Sequence[Bools]
+) -> Iterator[tuple[str, Array]]:
+    """Log mean Bayes factor (r,) of every effect in each run."""
     stack, fitted = problem.stack, model.fitted
     gram = Gram(problem, model, ~stack.new)
-    each = []
     for name, every in first.effects.items():
         shapes = [one.signature.fixed for one in every[: TUNING.search.again]]
         effect = stack.rig.effects[name]
@@ -84,8 +96,7 @@ def _of_effects(problem: Problem, model: Model, first: Pass, runs: Sequence[Bool
         ]
         made = [_in_runs(problem, gram, one, runs) for one in tried if one is not None]
         if made:
-            each.append(log_sum(made) - np.log(len(made)))
-    return np.asarray(log_sum(each) - np.log(len(each))) if each else np.zeros(len(runs))
+            yield name, np.asarray(log_sum(made) - np.log(len(made)))
 
 
 def _in_runs(problem: Problem, gram: Gram, made: Signature, runs: Sequence[Bools]) -> Array:

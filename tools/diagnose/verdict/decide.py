@@ -356,6 +356,6 @@ def shown(search: EffectSearch, screen: Screen) -> list[str]:
     seen = []
     for name, likeliest in screen.best.items():
         a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
-        if screen.seen(likeliest.prior + log_bayes_expected(np.diag(a))):
+        if screen.seen(name, likeliest.prior + log_bayes_expected(np.diag(a))):
             seen.append(name)
     return seen

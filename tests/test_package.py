@@ -113,6 +113,7 @@ def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel
     of_x86 = {"checksum"} if platform.machine() == "x86_64" else set()
     assert {Path(name).name.partition(".")[0] for name in compiled} == {
         "algebra",
+        "balance",
         "closed",
         "innovations",
         "messages",

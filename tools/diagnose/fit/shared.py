@@ -38,6 +38,7 @@ from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, ra
 from gritd.tools.diagnose.fit.ripples import line_waves
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.stretches import GridMotion, Ints, nearest, stretches
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.stack import Stack
@@ -121,22 +122,23 @@ def _part_of(effect: type[Effect]) -> str:
 
 def rippling_columns(stack: Stack) -> Array:
     """Cosine and sine (N, m) of the ripples that the reference's readings show at their own rate,
-    of the size that they have there; of every stretch and channel its own.
+    of the size that they have there; of every channel its own, in every stretch of ripples that
+    stand out there, else in every run.
     """
     lines = stack.rig.lines
-    waves: dict[tuple[int, float], list[tuple[float, Index, Array]]] = {}
+    waves: dict[tuple[int, float], list[tuple[SpectralLine, Index, Array]]] = {}
     for line, index, wave in line_waves(stack, lines.shared):
         of = (int(stack.channel[index[0]]), line.at)
-        waves.setdefault(of, []).append((lines.before(line), index, wave))
+        waves.setdefault(of, []).append((line, index, wave))
 
     columns = [np.zeros((stack.size, 0))]
     for runs in waves.values():
         known = [index for _, index, _ in runs if not stack.new[index[0]]]
         if known:
             usual = _level(stack, known)
-            for size, index, wave in runs:
-                largest = size * max(_level(stack, [index]) / usual, 1.0) * wave
-                stretch = _stretches(stack, index)
+            for line, index, wave in runs:
+                largest = lines.before(line) * max(_level(stack, [index]) / usual, 1.0) * wave
+                stretch = _stretches(stack, index) if lines.found(line) else 0 * index
                 for number in np.unique(stretch):
                     own = np.zeros((stack.size, 2))
                     own[index] = np.where((stretch == number)[:, None], largest, 0.0)

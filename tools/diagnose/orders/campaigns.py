@@ -58,8 +58,11 @@ class Lines:
 
     def shared(self, line: SpectralLine) -> bool:
         """Whether the reference has a line too: found there, or held at half its size."""
-        found = any(same(line, other) for other in self.reference)
-        return found or line.before > TUNING.orders.known * line.size
+        return self.found(line) or line.before > TUNING.orders.known * line.size
+
+    def found(self, line: SpectralLine) -> bool:
+        """Whether a line stands out of the reference by itself."""
+        return any(same(line, other) for other in self.reference)
 
     def orders(self, low: float, high: float) -> list[float]:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported

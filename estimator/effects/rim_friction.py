@@ -62,5 +62,5 @@ class RimFriction(Effect):
             law,
             adhesion=law.adhesion * (1.0 - self.adhesion_loss),
             friction=law.friction * (1.0 - self.smoothness),
-            mobilisation=sliding,
+            mobilisation=sliding if self.smoothness and self.sliding else shear,
         )

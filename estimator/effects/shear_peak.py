@@ -46,6 +46,8 @@ class ShearPeak(Effect):
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        if not self.overshoot:
+            return law
         settled = law.mobilisation
 
         def peaked(x: Array) -> Array:

@@ -47,9 +47,7 @@ class Response:
 
     slip: Array  # true i [-]
     theta_1: Array  # [rad]
-    overloaded: (
-        balance.Bools
-    )  # the load exceeds what the soil carries, θ₁ is held at balance.DEEPEST
+    overloaded: balance.Bools  # the load exceeds what the soil carries: see Balance
     sinkage: Array  # of the axle [m]
     drawbar_pull: Array  # [N]
     load: Array  # [N]

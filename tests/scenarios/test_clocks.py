@@ -67,7 +67,8 @@ def undisturbed(folder, played):
             try:
                 return played(daemon, encoders)
             except AssertionError:
-                daemon.stop()
+                if daemon.process.poll() is None:
+                    daemon.stop()
                 late = encoders.lateness() + largest_lateness(daemon.path())
                 if late < HELD_BACK:
                     raise

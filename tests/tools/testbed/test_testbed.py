@@ -32,6 +32,8 @@ TESTBED = config.load(packaged())
 NS = 1_000_000_000
 HELD_UP = 0.25  # [s]
 TICK = 4_000_000  # [ns]
+ARRIVES = 20.0  # [s] the limit only ends a test that fails
+HELD_BACK = 15e6  # [ns] what is held back by more may look like a step of its clock
 RESOLUTION = {
     "sinkage_pot": 1e-6,
     "motor_shunt": 1e-6,
@@ -114,20 +116,45 @@ def assert_nearly_all_and_nothing_else(sent, received):
 
 @buses
 def test_every_reading_arrives_as_it_was_sent(bus, tmp_path):
+    """Where the computer stands still at either end of the wire, what it holds back may be taken
+    for a wrong clock: then they are sent again, up to three times.
+    """
     readings = in_transit(experiment(TESTBED, 8.0, "linear", 3).run.readings, 0)[6000:6900]
+    for attempt in range(3):
+        received, lost, late = sent(readings, bus, tmp_path / str(attempt))
+        if late < HELD_BACK or len(received) == len(readings):
+            break
+
+    assert not any(lost.values())
+    assert_same_values(by_channel(readings), by_channel(received))
+
+
+def sent(readings, bus, folder):
+    """What is read of them, up to the first that does not arrive; what did not go onto the wires;
+    how late they went or were read, at most [ns].
+    """
+    folder.mkdir()
+    late = 0
+
+    def since(reading):
+        return time.monotonic_ns() - begin - reading.stamp
+
     with ConnectedDevices(TESTBED.settings, bus) as rig:
-        path = rig_config.write(TESTBED, rig.devices, "linear", tmp_path)
+        path = rig_config.write(TESTBED, rig.devices, "linear", folder)
         with Daemon(path) as daemon:
             begin = time.monotonic_ns() - readings[0].stamp
             for start in range(0, len(readings), 30):  # no faster than the wires' buffers
                 part = readings[start : start + 30]
                 # nor than the devices: a device whose clock runs ahead of ours is not believed
-                assert wait_until(lambda last=part[-1]: time.monotonic_ns() - begin >= last.stamp)
+                wait_until(lambda last=part[-1]: since(last) >= 0)
+                late = max(late, since(part[-1]))
                 for reading in part:
                     rig.send(reading)
-                assert wait_until(lambda goal=start + 30: daemon.take() >= min(goal, len(readings)))
-        assert not any(rig.lost.values())
-    assert_same_values(by_channel(readings), by_channel(daemon.readings))
+                gone = start + len(part)
+                if not wait_until(lambda gone=gone: daemon.take() >= gone, ARRIVES):
+                    break
+                late = max(late, since(part[-1]))
+    return daemon.readings, rig.lost, late
 
 
 def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(tmp_path):

@@ -63,6 +63,11 @@ class Pass:
         every = self.effects[name]
         return float(log_sum([one.evidence + one.signature.prior for one in every]))
 
+    @property
+    def most(self) -> float:
+        """Log evidence of the likeliest effect, or of the fit alone."""
+        return max(map(self.evidence, self.effects), default=self.alone)
+
     def exact(self, name: str) -> float:
         """Log Bayes factor beside the model without a discrepancy, averaged likewise."""
         return float(log_sum([one.exact + one.signature.prior for one in self.effects[name]]))

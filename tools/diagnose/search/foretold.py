@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gritd.tools.diagnose.fit.attempt import attempted
+from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.evidence import (
     Pass,
@@ -16,6 +17,7 @@ from gritd.tools.diagnose.screen.evidence import (
     pass_beside,
     varied_pass,
 )
+from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -25,12 +27,13 @@ TURNING = "wheel_angle"  # what an effect that ripples goes with
 @dataclass(frozen=True)
 class Predicted:
     """An effect beside a model: its log evidence by linear algebra, of the model with it [nats],
-    and where its fit begins.
+    and where its fit begins. stand: where linear algebra looked (`standing`).
     """
 
     model: Model
     evidence: float
     starts: tuple[Weighed, ...]
+    stand: Model
 
     @property
     def effect(self) -> str:
@@ -43,13 +46,42 @@ class Predicted:
         return frozenset((*self.model.names, self.effect))
 
 
+def standing(screening: Screening, model: Model) -> list[Model]:
+    """Where linear algebra may look for more beside a model: where it was fitted. If what is
+    missing strains constants there, the way to it may be straighter from the constants as they are
+    known.
+    """
+    fitted, problem, marginal = model.fitted, screening.problem, model.marginal
+    known = 0.0 * fitted.u if screening.usual is None else screening.usual
+    if marginal is None or np.abs(fitted.u - known).max(initial=0.0) <= TUNING.rig.doubt:
+        return [model]
+    sizes = [term.sizes.values[n] for term, n in zip(marginal.terms, model.chosen, strict=True)]
+    sized = problem.with_terms(marginal.terms, sizes)
+    there = sized.descend(fitted.effects, fitted.free, known, fitted.x, rounds=0)
+    marginal = Marginal(there, problem.fixed, marginal.terms)
+    chosen, evidence = marginal.likeliest(model.chosen)
+    of_form = chosen[: len(model.sizes)]
+    return [model, Model(there, model.names, evidence, of_form, (), marginal, chosen)]
+
+
+def passed(
+    stands: Sequence[Model], look: Callable[[Model], Pass], first: Sequence[Pass] = ()
+) -> tuple[Model, Pass]:
+    """From where something is likeliest, and what is seen from there. first: passes that are known
+    of the first places.
+    """
+    every = [*first, *(look(stand) for stand in stands[len(first) :])]
+    return max(zip(stands, every, strict=True), key=lambda pair: pair[1].most)
+
+
 def gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
     """Effects that gain enough beside a model: a share of the best, which a fit may turn round."""
-    first = search.first.effects
     if model is search.bare:
-        beside = varied_pass(search.problem, model, first, jobs)
+        stand = search.stand
+        beside = varied_pass(search.problem, stand, search.passed, jobs)
     else:
-        beside = pass_beside(search.problem, model, first)
+        stands = standing(search.screening, model)
+        stand, beside = passed(stands, lambda m: pass_beside(search.problem, m, search.passed))
 
     names = list(beside.effects)
     if not search.first.on_grid:  # a ripple alone raised the alarm
@@ -59,8 +91,9 @@ def gains(search: EffectSearch, model: Model, jobs: int) -> list[Predicted]:
     alone = TUNING.search.little if model.names else 0.0
     least = max(alone, TUNING.search.predicted_share * top - TUNING.search.predicted_less)
     likely = [name for name in names if beside.gain(name) > least]
+    known = model.evidence - beside.alone if stand is model else 0.0
     return [
-        Predicted(model, model.evidence + beside.gain(n), _starts(search, model, beside, n))
+        Predicted(model, known + beside.evidence(n), _starts(search, model, beside, n), stand)
         for n in likely
     ]
 
@@ -69,18 +102,18 @@ def together(search: EffectSearch) -> list[Predicted]:
     """The likeliest pairs of effects beside the bare model, where one of them was fitted alone: the
     likelier one, beside which the other begins.
     """
-    bare, first = search.bare, search.first.effects
+    stand, first = search.stand, search.passed
     if len(first.effects) < 2 or not search.first.on_grid:
         return []
     most = TUNING.search.together
     alone, out = {model.names[0]: model for model in search.sized(1)}, []
-    for pair in attempted(lambda: pairs_beside(search.problem, bare, first, most)) or []:
+    for pair in attempted(lambda: pairs_beside(search.problem, stand, first, most)) or []:
         fitted = [alone[name] for one in pair.each if (name := str(one.signature.of)) in alone]
         if fitted:
             model = max(fitted, key=lambda m: m.evidence)
             other = next(one for one in pair.each if one.signature.of not in model.names)
-            sizes = (*other.sizes, *(0 for _ in model.chosen[len(bare.chosen) :]))
-            out.append(Predicted(model, pair.evidence, (replace(other, sizes=sizes),)))
+            sizes = (*other.sizes, *(0 for _ in model.chosen[len(stand.chosen) :]))
+            out.append(Predicted(model, pair.evidence, (replace(other, sizes=sizes),), model))
     return out
 
 

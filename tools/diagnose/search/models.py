@@ -9,6 +9,7 @@ import numpy as np
 
 from gritd.tools.diagnose.fit.model import Model, in_one_place
 from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.screen.evidence import Pass
 from gritd.tools.diagnose.screen.screening import Screen, Screening
 from gritd.tools.diagnose.search.calibration import OddsCalibration, learnt
 
@@ -19,12 +20,15 @@ class EffectSearch:
 
     models: the base model first, exact in its form; then the bare model, with the discrepancy of
         form that the recordings ask for; then those with effects.
+    stand: where linear algebra looks beside the bare model (`standing`), and passed, what it finds.
     failed: effects whose fit ended in a numerical failure.
     """
 
     screening: Screening
     models: tuple[Model, ...]
     first: Screen
+    stand: Model
+    passed: Pass
     failed: tuple[tuple[str, ...], ...] = ()
 
     @property

@@ -24,8 +24,9 @@ from gritd.tools.diagnose.fit.model import Model, does, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.screen.evidence import Pass, one_pass
 from gritd.tools.diagnose.screen.screening import Screening, screen
-from gritd.tools.diagnose.search.foretold import Predicted, gains, together
+from gritd.tools.diagnose.search.foretold import Predicted, gains, passed, standing, together
 from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT
@@ -47,6 +48,7 @@ def search_models(
         return search
 
     tell = counting(step, "fitting the likely effects")
+    search = _passed_from_known(search, jobs)
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
     search = _settled(search, jobs)
     tested: Model | None = None
@@ -66,7 +68,19 @@ def search_models(
 def begin(screening: Screening, jobs: int = 1) -> EffectSearch:
     """The base model, the bare one, and what stands out beside it."""
     bare = _bare(screening, screening.base)
-    return EffectSearch(screening, (screening.base, bare), screen(screening, bare, jobs))
+    first = screen(screening, bare, jobs)
+    return EffectSearch(screening, (screening.base, bare), first, bare, first.effects)
+
+
+def _passed_from_known(search: EffectSearch, jobs: int) -> EffectSearch:
+    """With the pass over every effect from where it sees most."""
+
+    def look(stand: Model) -> Pass:
+        return one_pass(search.problem, stand, jobs)
+
+    stands = standing(search.screening, search.bare)
+    stand, seen = passed(stands, look, [search.passed])
+    return replace(search, stand=stand, passed=seen)
 
 
 def _bare(screening: Screening, start: Model) -> Model:
@@ -168,18 +182,14 @@ def shared(search: EffectSearch) -> list[object]:
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
     """The model with one more effect, the best of its starts; the first effect that is new begins
-    where the reference puts the constants. Where what the effect does had driven a constant to its
-    bound, one begins with all constants as they are known. Where it ends well below what linear
-    algebra foretold, the discrepancy may have taken the effect's part: it is fitted again from
-    none. Where it ends well below the model that it holds, also from there, with the effect's
-    strengths at nought.
+    where the reference puts the constants. Where it ends well below what linear algebra foretold,
+    the discrepancy may have taken the effect's part: it is fitted again from none. Where it ends
+    well below the model that it holds, also from there, with the effect's strengths at nought.
     """
     model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
     known = search.screening.usual
-    constants = model.fitted.u if model.names or known is None else known
+    constants = predicted.stand.fitted.u if model.names or known is None else known
     begins = [(one.start, one.sizes, constants) for one in predicted.starts]
-    if model.fitted.held[: model.fitted.u.size].any():
-        begins += [(start, sizes, 0.0 * u) for start, sizes, u in begins]
     made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
     if made.evidence > predicted.evidence - TUNING.search.little:
         return made
@@ -207,7 +217,8 @@ def _fitted_with(
     begins = (u, np.concatenate((fitted.x, start)))
     forms, count = screening.forms, len(screening.forms)
     errors = replace(predicted.model.other_forms, sizes=sizes[count:])
-    return fit_model(screening.problem, forms, effects, free, begins, sizes[:count], errors, fitted)
+    near = predicted.stand.fitted
+    return fit_model(screening.problem, forms, effects, free, begins, sizes[:count], errors, near)
 
 
 def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:

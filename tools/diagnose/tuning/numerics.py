@@ -31,7 +31,8 @@ class Numerics:
     least_precision: float = 0.1  # share of its precision that a strength's start keeps
 
     # --- differences ---
-    step: float = 2e-3  # [prior σ or expected size] for differences
+    # [prior σ or expected size] for differences: small, for slopes turn where soil gives way
+    step: float = 1e-5
     runaway: float = 10.0  # times the largest value measured: a change by more runs away
 
     # --- rounds ---

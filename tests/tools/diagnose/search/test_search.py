@@ -48,7 +48,7 @@ def searched(*acting: Effect, **given: Any) -> EffectSearch:
 def offered(model: Model, name: str, start: list[float], sizes: tuple[int, ...] = ()) -> Predicted:
     """An effect whose fit begins at parameters in expected sizes."""
     made = Signature(name, np.zeros((0, 0)), (), {})
-    return Predicted(model, 9.0, (Weighed(made, 9.0, 9.0, np.array(start), sizes),))
+    return Predicted(model, 9.0, (Weighed(made, 9.0, 9.0, np.array(start), sizes),), model)
 
 
 def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
@@ -115,7 +115,7 @@ def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPa
     rig = SimpleNamespace(effects=dict.fromkeys(EFFECTS))
     problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), nuisance=SimpleNamespace(parts=()))
     screening: Any = SimpleNamespace(problem=problem, forms=())
-    search = EffectSearch(screening, (bare, bare), cast(Any, None))
+    search = EffectSearch(screening, (bare, bare), *cast(Any, (None, None, None)))
 
     found = extended(search, [bare], 3, 1)
     assert [model.names for model in found.models[2:]] == [("coulomb_friction",)]
@@ -213,7 +213,7 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
     """One load: a wall's mean friction looks like a weaker soil, its waves do not."""
     search = searched(RoughWall(0.05), loads=(70.0, 70.0))
     first = search.first.effects
-    varied = varied_pass(search.problem, search.bare, first)
+    varied = varied_pass(search.problem, search.stand, first)
     assert varied.gain("side_wall_rubbing") > first.gain("side_wall_rubbing") + 50.0
 
     predicted = next(p for p in gains(search, search.bare, 1) if p.effect == "side_wall_rubbing")

@@ -48,7 +48,6 @@ def search_models(
         return search
 
     tell = counting(step, "fitting the likely effects")
-    search = _passed_from_known(search, jobs)
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
     search = _settled(search, jobs)
     tested: Model | None = None
@@ -69,17 +68,14 @@ def begin(screening: Screening, jobs: int = 1) -> EffectSearch:
     """The base model, the bare one, and what stands out beside it."""
     bare = _bare(screening, screening.base)
     first = screen(screening, bare, jobs)
-    return EffectSearch(screening, (screening.base, bare), first, bare, first.effects)
-
-
-def _passed_from_known(search: EffectSearch, jobs: int) -> EffectSearch:
-    """With the pass over every effect from where it sees most."""
+    search = EffectSearch(screening, (screening.base, bare), first, bare, first.effects)
+    if not first.alarmed:
+        return search
 
     def look(stand: Model) -> Pass:
-        return one_pass(search.problem, stand, jobs)
+        return one_pass(screening.problem, stand, jobs)
 
-    stands = standing(search.screening, search.bare)
-    stand, seen = passed(stands, look, [search.passed])
+    stand, seen = passed(standing(screening, bare), look, [first.effects])
     return replace(search, stand=stand, passed=seen)
 
 

@@ -222,6 +222,16 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes() -
     assert fitted.evidence > search.bare.evidence + 50.0
 
 
+def test_what_strains_the_constants_is_foretold_from_what_is_known_of_them() -> None:
+    """From where a strong loss drove the constants no straight way leads back."""
+    search = searched(make("coulomb_friction", {"loss": 0.8}))
+    assert np.abs(search.bare.fitted.u).max() > TUNING.rig.doubt
+    predicted = next(p for p in gains(search, search.bare, 1) if p.effect == "coulomb_friction")
+    fitted = _with_effect(search, predicted)
+    assert fitted.fitted.acting[0].loss == pytest.approx(0.8, rel=0.05)  # type: ignore[attr-defined]
+    assert fitted.evidence == pytest.approx(predicted.evidence, abs=TUNING.search.little)
+
+
 def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     patch = make("soil_patch", {"friction_change": -0.2, "centre": 0.2, "length": 0.2})
     search = searched(patch)

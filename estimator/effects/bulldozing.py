@@ -8,6 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.situation import Balanced, Reaction
+from gritd.estimator.terramechanics.earth_pressure import blade_resistance
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,10 @@ class Bulldozing(Effect):
     )
 
     def wheel(self, reaction: Reaction, situation: Balanced) -> Reaction:
-        z, phi = np.maximum(situation.sinkage, 0.0), np.arctan(situation.tan_phi)
-        x = 0.25 * np.pi - 0.5 * phi
-        cot_x = 1.0 / np.tan(x)
-        wedge = situation.cohesion * z + 0.5 * self.unit_weight * z**2 * (
-            cot_x + cot_x**2 * situation.tan_phi
-        )
-        resistance = self.share * situation.width * (cot_x + np.tan(x + phi)) * wedge
+        z = np.maximum(situation.sinkage, 0.0)
+        area, moment = situation.width * z, 0.5 * situation.width * z**2
+        soil = situation.cohesion, situation.tan_phi, self.unit_weight
+        resistance = self.share * blade_resistance(area, moment, *soil)
         return replace(
             reaction, drawbar_pull=reaction.drawbar_pull - situation.direction * resistance
         )

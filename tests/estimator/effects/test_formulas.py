@@ -50,6 +50,33 @@ def test_a_rim_slides_where_soil_would_carry_more(motion: Motion, stiff: float) 
     np.testing.assert_allclose(found.torque, expected.torque, rtol=0.02, atol=1e-3)
 
 
+def test_a_wheel_that_slides_pushes_soil_before_its_side(motion: Motion, plain: Response) -> None:
+    """By Hegedus's formula for a strip, over the side that is in the soil; the rest stays."""
+    turned = {"angle": 0.4, "digging": 0.0}
+    held, pushing = (
+        simulate_arrays(WHEEL, SOIL, motion, (make("side_slip", {**turned, "pushing": share}),))
+        for share in (0.0, 0.5)
+    )
+    np.testing.assert_allclose(pushing.drawbar_pull, held.drawbar_pull, rtol=1e-12)
+    np.testing.assert_allclose(pushing.sinkage, held.sinkage, rtol=1e-12)
+
+    phi = np.arctan(SOIL.tan_phi)
+    x = 0.25 * np.pi - 0.5 * phi
+    blade = 1.0 / np.tan(x) + np.tan(x + phi)
+    weight = 15e3 * (1.0 / np.tan(x) + SOIL.tan_phi / np.tan(x) ** 2)
+
+    def strip(theta: float, end: float) -> float:
+        depth = WHEEL.radius * (np.cos(theta) - np.cos(end))
+        wide = WHEEL.radius * np.cos(theta)
+        return float(blade * (SOIL.cohesion * depth + 0.5 * weight * depth**2) * wide)
+
+    more = np.subtract(pushing.sensed.side_force, held.sensed.side_force)
+    for at in np.flatnonzero(situation_of(motion, WHEEL).direction > 0.0)[::200]:
+        end = float(np.arccos(1.0 - held.sinkage[at] / WHEEL.radius))
+        expected = 0.5 * np.sin(0.4) * integrate.quad(strip, 0.0, end, args=(end,))[0]
+        assert more[at] == pytest.approx(expected, rel=1e-6)
+
+
 def test_soil_springs_back_less_where_it_slips(motion: Motion, plain: Response) -> None:
     """A ratio that falls with slip is one ratio at one slip, and none beyond where it ends."""
     slip = np.asarray(situation_of(motion, WHEEL).slip)

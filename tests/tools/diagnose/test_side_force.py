@@ -75,7 +75,7 @@ def test_what_only_a_side_force_tells_is_not_sought_without_one(
     recordings = read_all(files)
     rigs = [rig_of(recordings, own)[0] for own in (settings, shown(settings, 1.0))]
     without, having = ({p.name for p in rig.effects["side_slip"].parameters()} for rig in rigs)
-    assert having - without == {"across", "digging"} and "angle" in without
+    assert having - without == {"across", "digging", "pushing"} and "angle" in without
 
 
 def test_check_config_shows_the_axis_and_refuses_a_scale_of_nil(

@@ -127,7 +127,9 @@ def descend(
 
         if better is None:
             return here, False
-        here, unsure = ground.moved(here, better), better
+        # a search looks at many curved valleys: there slopes that foretold the step will do
+        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
+        here, unsure = ground.moved(here, better), None if foretold else better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
     if unsure is not None:

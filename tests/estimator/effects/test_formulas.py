@@ -50,7 +50,7 @@ def test_a_rim_slides_where_soil_would_carry_more(motion: Motion, stiff: float) 
     np.testing.assert_allclose(found.torque, expected.torque, rtol=0.02, atol=1e-3)
 
 
-def test_a_wheel_that_slides_pushes_soil_before_its_side(motion: Motion, plain: Response) -> None:
+def test_a_wheel_that_slides_pushes_soil_before_its_side(motion: Motion) -> None:
     """By Hegedus's formula for a strip, over the side that is in the soil; the rest stays."""
     turned = {"angle": 0.4, "digging": 0.0}
     held, pushing = (

@@ -97,10 +97,8 @@ def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() ->
     base = fit_base(rig)
     forms = form_terms(base.problem.stack, base.problem.noise)
 
-    begins, sizes = (
-        (base.fitted.u, np.array([0.5, 0.0, 0.0, 0.0, 0.0, 2.0])),
-        tuple(0 for _ in forms),
-    )
+    begins = base.fitted.u, np.array([0.5, 0.0, 0.0, 0.0, 0.0, 2.0])
+    sizes = tuple(0 for _ in forms)
     model = fit_model(base.problem, forms, both, free_of(both), begins, sizes)
     assert model.marginal is not None
     assert model.marginal.gain(model.chosen) < 0.5

@@ -138,14 +138,15 @@ def conditions_of(
 ) -> Array:
     """Conditions (n, d) of one run, in units of the lengths above.
 
-    slip [-], load [N], rim_speed [m/s] (positive), direction ±1, travel of the rim [m]: each (n,).
+    slip [-], load [N], rim_speed [m/s] (positive), direction ±1, travel of the rim since the run
+    began [m]: each (n,).
     """
     slip, weight = np.clip(slip, -1.0, 1.0), np.log(np.maximum(load, 1e-3) / usual.load)
     speed = np.log(np.maximum(rim_speed, 1e-6) / usual.rim_speed)
     lags = [trailing(slip, travel, length) - slip for length in TRAVELS]
     load_lag = trailing(weight, travel, LOAD_TRAVEL) - weight
 
-    start = np.exp(-np.abs(travel - travel[:1]) / START_TRAVEL)
+    start = np.exp(-np.abs(travel) / START_TRAVEL)
 
     lengths = (SLIP, LOAD, SPEED, DIRECTION, *(LAG,) * len(TRAVELS), LOAD_LAG, START)
     parts = (slip, weight, speed, direction, *lags, load_lag, start)

@@ -4,9 +4,10 @@ What is written is all that the recordings show beyond the equations and the acc
 configured calibration: the discrepancy of form, how far the form of an effect differs from the
 library's (of one that the reference shows too), and what the fit moved calibration constants by (a
 torque constant that is 1 % off looks like a δ of 1 %). Few directions hold most of what stays
-uncertain of it, in all channels together; the rest is one number a channel. The soil that is
-written may be an average over several explanations. The mean of δ is then the one that belongs to
-that soil: their sum, which the recordings show, stays what it is.
+uncertain of it, in all channels together; the rest is one number a channel. The mean of δ is what
+the fit has, all its terms counted, less what the equations say with the soil and the effects that
+are written: a soil that is an average over several explanations, say. So their sum, which the
+recordings show, stays what it is.
 
 Not written: what goes with the wheel's angle, whose zero no recording keeps, and the discrepancy of
 a drive whose both sides are measured.
@@ -30,7 +31,7 @@ from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model, with_forms_had
-from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.fit.problem import Problem, build
 from gritd.tools.diagnose.rig.interface import HAD, Bools, FormSource, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -41,13 +42,13 @@ WHEN = ("delay", "blur")  # kinds of constants that move a channel in time
 
 @dataclass(frozen=True)
 class _Source:
-    """One channel's δ where it acts: features (n, m), and as a linear map (n, w) of the unknowns,
-    in sizes.
+    """One channel's δ where it acts, in sizes: its mean (n,), features (n, m), and as a linear map
+    (n, w) of the unknowns.
     """
 
+    mean: Array
     features: Array
     map: Array
-    start: Array  # (n,) what the configuration held already
     size: float
     usual: float  # root mean square of the channel, in its unit
 
@@ -61,22 +62,19 @@ def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) ->
         return None
 
     model = with_forms_had(problem, model)
-    unknowns = _Unknowns(problem, model, sources, soil)
+    unknowns = _Unknowns(problem, model, sources)
     points = np.round(_points(stack, sources), TUNING.explain.learnt_places - 2)
-    parts = {s.name: _source(problem, model, s, points, unknowns) for s in sources}
+    beyond = _beyond(problem, model, unknowns, _as_written(stack.rig, model, soil))
+    if not np.isfinite(beyond).all():  # what is written runs away
+        return None
+    parts = {s.name: _source(problem, model, s, points, unknowns, beyond) for s in sources}
     return _Reduced(unknowns, parts, points).form(_domain(stack, sources), usual)
 
 
 class _Unknowns:
     """Mean (w,) and covariance (w, w) of constants, effect parameters and weights of the forms."""
 
-    def __init__(
-        self,
-        problem: Problem,
-        model: Model,
-        sources: list[FormSource],
-        soil: Mapping[str, Quantity],
-    ) -> None:
+    def __init__(self, problem: Problem, model: Model, sources: list[FormSource]) -> None:
         rig, marginal, fitted = problem.stack.rig, model.marginal, model.fitted
         assert marginal is not None
         names = [f.name for f in marginal.terms]
@@ -93,17 +91,12 @@ class _Unknowns:
         count = len(fitted.u)
         constants = [k for k in rig.constants if k.soil]
         self.soil_names = [k.name for k in constants]
-        at = [linear(rig, k, self.mean[:count]) for k in constants]
         self.soil = np.zeros((len(constants), len(self.mean)))
-        self.soil[:, :count] = np.array([slope for _, slope in at])
+        self.soil[:, :count] = [linear(rig, k, self.mean[:count])[1] for k in constants]
         own = self.soil @ self.spread @ self.soil.T
         sigma, self.among = _parted(own)
         # correlation, times its own σ, of every unknown with the soil
         self.beside = self.spread @ self.soil.T / sigma
-        # as it is once the soil is the one that is written
-        written = [soil[k.name].value - value for k, (value, _) in zip(constants, at, strict=True)]
-        apart = np.linalg.lstsq(self.among, np.array(written) / sigma, rcond=None)[0]
-        self.adjusted = self.mean + self.beside @ apart
 
 
 def _parted(covariance: Array) -> tuple[Array, Array]:
@@ -115,6 +108,26 @@ def _parted(covariance: Array) -> tuple[Array, Array]:
     correlation = covariance / np.outer(sigma, sigma)
     np.fill_diagonal(correlation, 1.0)
     return sigma, np.asarray(correlation)
+
+
+def _as_written(rig: Rig, model: Model, soil: Mapping[str, Quantity]) -> Array:
+    """Constants (q,) of a configuration with a soil: calibration as it was, all else as fitted."""
+    u = model.fitted.u.copy()
+    u[_calibration(rig)] = 0.0
+    change = {k.changes: k.of(x) for k, x in zip(rig.constants, u.tolist(), strict=True)}
+    for number, constant in enumerate(rig.constants):
+        if constant.soil:  # as it is in the new campaign
+            factor = float(np.exp(change.get(constant.name, 0.0)))
+            u[number] = constant.strain(soil[constant.name].value / factor)
+    return u
+
+
+def _beyond(problem: Problem, model: Model, unknowns: _Unknowns, u: Array) -> Array:
+    """What constants and effects of the fit say (N,) more than those that are written."""
+    fitted = model.fitted
+    effects = build(fitted.effects, fitted.free, model.parameters()[0])
+    moved = unknowns.mean[: len(fitted.centre)] - fitted.centre
+    return fitted.predicted + fitted.raw @ moved - problem.stack.predict(u, effects)
 
 
 def _points(stack: Stack, sources: list[FormSource]) -> Array:
@@ -129,7 +142,12 @@ def _acting(stack: Stack, source: FormSource) -> Bools:
 
 
 def _source(
-    problem: Problem, model: Model, source: FormSource, points: Array, unknowns: _Unknowns
+    problem: Problem,
+    model: Model,
+    source: FormSource,
+    points: Array,
+    unknowns: _Unknowns,
+    beyond: Array,
 ) -> _Source:
     stack, fitted, marginal = problem.stack, model.fitted, model.marginal
     assert marginal is not None
@@ -140,6 +158,7 @@ def _source(
     end = unknowns.places[number].stop  # what goes with the wheel's angle stands last
     whole[:, end - 2 * len(TUNING.fit.form_harmonics) : end] = 0.0
     whole[:, unknowns.place_of_held] = unknowns.held[rows]
+    mean = beyond[rows] + whole @ unknowns.mean
     calibration = _calibration(stack.rig)
     whole[:, calibration] = fitted.raw[rows][:, calibration]
 
@@ -150,9 +169,9 @@ def _source(
     conditions = conditions_at(stack, source)[rows]
     root = root_of(points)
     features = solve_triangular(root, covariance(conditions, points).T, lower=True).T
-    held = stack.rig.held
-    start = np.zeros(len(scale)) if held is None else stack.joined(held.means)[rows] / scale
-    return _Source(features, whole / scale[:, None], start, size, usual)
+    if stack.rig.held is not None:  # what the configuration held already
+        mean = mean + stack.joined(stack.rig.held.means)[rows]
+    return _Source(mean / scale, features, whole / scale[:, None], size, usual)
 
 
 def _calibration(rig: Rig) -> list[int]:
@@ -180,8 +199,7 @@ class _Reduced:
         self._unknowns, self._parts, self._points = unknowns, parts, points
         maps = [_fit_of(part.features) for part in parts.values()]
         self._map = np.vstack([m @ p.map for m, p in zip(maps, parts.values(), strict=True)])
-        start = np.concatenate([m @ p.start for m, p in zip(maps, parts.values(), strict=True)])
-        self.mean = self._map @ unknowns.adjusted + start
+        self.mean = np.concatenate([m @ p.mean for m, p in zip(maps, parts.values(), strict=True)])
         spread, shared = unknowns.spread, self._map @ unknowns.beside
 
         root = _root(list(parts.values()))
@@ -213,7 +231,7 @@ class _Reduced:
     def _channel(self, part: _Source, place: slice) -> ChannelForm:
         """Where the points cannot follow by more than its size, the size is that."""
         mean, spread = self.mean[place], self.directions[place].T
-        left = part.map @ self._unknowns.adjusted + part.start - part.features @ mean
+        left = part.mean - part.features @ mean
         whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
         kept = np.sum((part.features @ spread.T) ** 2, axis=1)
         rest = float(np.sqrt(np.mean(np.maximum(whole - kept, 0.0) + left**2)))

@@ -127,9 +127,7 @@ def descend(
 
         if better is None:
             return here, False
-        # a search looks at many curved valleys: there slopes that foretold the step will do
-        foretold = ground.curved.any() and abs(share - 1.0) < 1.0 - TUNING.numerics.good
-        here, unsure = ground.moved(here, better), None if foretold else better
+        here, unsure = ground.moved(here, better), better
         if bent or share <= TUNING.numerics.good:
             here = ground.followed(here, better)
     if unsure is not None:

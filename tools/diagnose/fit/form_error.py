@@ -198,6 +198,8 @@ def _following(stack: Stack, added: Array) -> Array:
     begins = run_begins(group, stack.size)
     angle = stack.covariate("wheel_angle")
     turned = np.where(begins, 0.0, np.abs(np.diff(angle, prepend=angle[0])))
+    if not turned.any():  # steady states: nothing builds up
+        return np.zeros((stack.size, 0))
     rolled = np.cumsum(turned)
     rolled -= rolled[begins][np.cumsum(begins) - 1]
 

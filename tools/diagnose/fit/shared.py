@@ -80,7 +80,8 @@ def _memory(stack: Stack, predicted: Array) -> Array:
     direction, columns = stack.covariate("direction"), [np.zeros((stack.size, 0))]
     for source in (source for source in stack.rig.forms if not source.drive):
         ways = [joined(stack, [run[:, k] for run in source.ways]) for k in range(4)]
-        for channel, way, length in product(source.channels, ways, TRAVELS):
+        known = [way for way in ways if way.any()]  # a steady state has no place
+        for channel, way, length in product(source.channels, known, TRAVELS):
             own = np.flatnonzero(stack.of(channel))
             share = -np.expm1(-np.abs(np.diff(way[own], prepend=0.0)) / length)
             follow = partial(followed, share=share, run=stack.run[own].astype(float))

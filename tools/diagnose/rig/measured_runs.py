@@ -20,6 +20,7 @@ from gritd.tools.diagnose.rig.states import states, turned_back, turning
 from gritd.tools.diagnose.tuning import TUNING
 
 COURSE = ("wheel_angle", "position", "time", "acceleration", "heat")
+LONG = 1e6  # [rad] the wheel has rolled in a steady state since any other
 HOLDING_NOTE = (
     "The motor holds torque while the wheel stands, so its current at rest tells no offset."
 )
@@ -76,7 +77,8 @@ def covariates(
     """Of one run (n,) each, SI; `rolled` is the angle [rad] that the wheel has turned, either way.
 
     tabled: a table of steady states has no course of time, place and wheel angle: these are 0, so
-        that the order of scatter that an importer drew is never taken for a trend or a ripple.
+        that the order of scatter that an importer drew is never taken for a trend or a ripple. A
+        wheel in a steady state began long ago.
     """
     situation, angle = situation_of(motion, wheel), np.asarray(motion.wheel_angle)
     current = filled(signals.analogue.get("current", np.zeros(signals.time.size)))
@@ -97,7 +99,9 @@ def covariates(
         "pass": motion.pass_number * ones,
         "constant": ones,
     }
-    return known | ({name: 0.0 * ones for name in COURSE} if tabled else {})
+    if tabled:
+        known |= {name: 0.0 * ones for name in COURSE} | {"rolled": LONG * np.cumsum(ones)}
+    return known
 
 
 def torque_is_held(runs: Sequence[GridRun]) -> bool:

@@ -21,7 +21,7 @@ class Numerics:
     damping: float = 5.0
     fulfilled: float = 0.1  # share of the expected gain: a step is taken
     good: float = 0.75  # share of the expected gain: the damping falls
-    rounds: int = 12  # of a descent at most: sizes are learnt in between
+    rounds: int = 20  # of a descent at most: sizes are learnt in between
     halvings: int = 7  # of the strengths of a new effect at its start, while it makes the fit worse
 
     # --- where it begins ---

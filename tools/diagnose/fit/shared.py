@@ -40,7 +40,7 @@ from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.orders.lines import SpectralLine
 from gritd.tools.diagnose.orders.stretches import GridMotion, Ints, nearest, stretches
-from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
@@ -61,12 +61,14 @@ def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]
     """Signatures (N, m) of all effects but ripples in both campaigns, about a prediction (N,) at
     constants u (q,), by what they are effects of; each effect of one expected size together.
     """
-    names = [name for name, effect in stack.rig.effects.items() if order_of(effect) is None]
+    had = {constant.parameter[0] for constant in stack.rig.constants if constant.kind == HAD}
+    every = stack.rig.effects.items()
+    names = [name for name, effect in every if order_of(effect) is None and name not in had]
     columns: dict[str, list[Array]] = {part: [np.zeros((stack.size, 0))] for part in PARTS}
     for name in names:
-        every = list(raw_signatures(stack, u, predicted, [name], everywhere=True))
+        each = list(raw_signatures(stack, u, predicted, [name], everywhere=True))
         own = columns[_part_of(stack.rig.effects[name])]
-        own += [s.columns / np.sqrt(len(every)) for s in every]
+        own += [s.columns / np.sqrt(len(each)) for s in each]
     return {part: np.column_stack(each) for part, each in columns.items()} | {
         STARTS: _starts(stack),
         MEMORY: _memory(stack, predicted),

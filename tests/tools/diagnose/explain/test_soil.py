@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import make
 from gritd.estimator.model.learnt import LearntForm
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain import learnt
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.result import Quantity
@@ -20,9 +22,11 @@ from gritd.tools.diagnose.fit.discrepancy import form_terms
 from gritd.tools.diagnose.fit.model import Model, sized_model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.interface import Constant
+from gritd.tools.diagnose.rig.held import held_form
+from gritd.tools.diagnose.rig.interface import HAD, Constant
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.proof.ours.cases import record
+from gritd.tools.proof.real.judge import rms
 from tests.tools.diagnose.campaigns import plan, settings
 
 C = Constant("c", 1000.0, 200.0, "Pa", soil=True, log=True)
@@ -103,6 +107,35 @@ def test_what_is_written_beside_the_soil_has_its_other_forms_too(
     exact = learnt_form(problem, model, soil)
     assert told is not None and exact is not None
     assert _open(told) > 1.5 * _open(exact)
+
+
+def test_soil_effects_and_what_is_written_beside_them_add_up_to_what_was_fitted() -> None:
+    """Whatever soil is written, an average over several explanations say: a configuration that
+    sinks the wheel twice as deep as it was measured models nothing.
+    """
+    problem, model = _fitted()
+    rig, soil = problem.stack.rig, _soil_of(problem, model)
+    other = {name: replace(q, value=1.2 * q.value) for name, q in soil.items()}
+    alone, whole = zip(*(_as_it_is_written(problem, model, s) for s in (soil, other)), strict=True)
+    for channel in ("drawbar_pull", "sinkage"):
+        own = problem.stack.of(channel)
+        by_soil = rms((alone[1] - alone[0])[own])
+        assert by_soil > 10.0 * problem.noise.colours[rig.channels.index(channel)].sigma
+        assert rms((whole[1] - whole[0])[own]) < 0.05 * by_soil
+
+
+def _as_it_is_written(
+    problem: Problem, model: Model, soil: dict[str, Quantity]
+) -> tuple[Array, Array]:
+    """The prediction (N,) with a soil and calibration as it was stated, and with δ beside it."""
+    form = learnt_form(problem, model, soil)
+    assert form is not None
+    stack, rig = problem.stack, problem.stack.rig
+    held = held_form(form, rig.runs, rig.channels, settings().wheel.radius, lost=False)
+    known = zip(rig.constants, model.fitted.u, strict=True)
+    u = [k.strain(soil[k.name].value) if k.soil else x * (k.kind == HAD) for k, x in known]
+    alone = stack.predict(np.array(u))
+    return alone, alone + stack.joined(held.means)
 
 
 def _open(form: LearntForm) -> float:

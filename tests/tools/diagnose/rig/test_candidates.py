@@ -10,6 +10,7 @@ import pytest
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.fit.shared import MEMORY, STARTS, shared_columns
 from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.stack import Stack
@@ -80,9 +81,23 @@ def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals
     along = {along for s in smooth_signatures(Stack(rig)) for along in s.shape.along}
     assert {"slip", "load"} <= along
     assert not {"time", "position", "heat", "wheel_angle", "acceleration"} & along
-    assert [f.conditions[0].tolist() for f in rig.forms] == [
-        f.conditions[0].tolist() for f in as_driven.forms
-    ]
+
+
+def test_a_steady_state_began_long_ago(driven: list[Signals]) -> None:
+    """Its slip, load and speed are as they were recorded. Nothing is left of a start or of an
+    earlier slip, nothing is remembered, and no state has what a run begins with for itself.
+    """
+    shown = [replace(run, info=replace(run.info, steady_states=True)) for run in driven]
+    rig, as_driven = wheel_rig(shown, settings()), wheel_rig(driven, settings())
+    for own, other in zip(rig.forms, as_driven.forms, strict=True):
+        np.testing.assert_array_equal(own.conditions[0][:, :4], other.conditions[0][:, :4])
+        assert not own.conditions[0][:, 4:].any()
+        assert other.conditions[0][:, 4:].any()
+
+    stack = Stack(rig)
+    u = np.zeros(len(rig.constants))
+    shared = shared_columns(stack, u, stack.predict(u))
+    assert not shared[STARTS].any() and not shared[MEMORY].any()
 
 
 def test_lugs_dig_and_grip_in_a_table_without_a_count(driven: list[Signals]) -> None:

@@ -151,10 +151,24 @@ def extended(
 
     fits = list(wanted.values())
     made = each(jobs, fitted, fits, shared(search), lambda done: tell(done, len(fits)))
-    pairs = zip(fits, made, strict=True)
+    pairs = list(zip(fits, made, strict=True))
     failed = tuple((*p.model.names, p.effect) for p, model in pairs if model is None)
-    models = (*search.models, *(model for model in made if model is not None))
+    reached = [(p, model) for p, model in pairs if model is not None]
+
+    def fitted_again(pair: tuple[Predicted, Model]) -> Model | None:
+        return attempted(lambda: _acting(search, _from_elsewhere(search, *pair)))
+
+    behind, count = _behind(reached), len(fits)
+    whole = count + len(behind)
+    more = each(jobs, fitted_again, behind, shared(search), lambda done: tell(count + done, whole))
+    models = (*search.models, *(m for _, m in reached), *(m for m in more if m is not None))
     return replace(search, models=tuple(_the_better(models)), failed=(*search.failed, *failed))
+
+
+def _behind(reached: Sequence[tuple[Predicted, Model]]) -> list[tuple[Predicted, Model]]:
+    """Fits that ended well below what linear algebra foretold, where that rivals the best fit."""
+    little, best = TUNING.search.little, max((m.evidence for _, m in reached), default=0.0)
+    return [(p, m) for p, m in reached if p.evidence > max(m.evidence + little, best - little)]
 
 
 def _acting(search: EffectSearch, model: Model) -> Model:
@@ -178,26 +192,26 @@ def shared(search: EffectSearch) -> list[object]:
 
 def _with_effect(search: EffectSearch, predicted: Predicted) -> Model:
     """The model with one more effect, the best of its starts; the first effect that is new begins
-    where the reference puts the constants. Where it ends well below what linear algebra foretold,
-    the discrepancy may have taken the effect's part: it is fitted again from none. Where it ends
-    well below the model that it holds, also from there, with the effect's strengths at nought.
+    where the reference puts the constants.
     """
-    model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
-    known = search.screening.usual
+    known, model = search.screening.usual, predicted.model
     constants = predicted.stand.fitted.u if model.names or known is None else known
     begins = [(one.start, one.sizes, constants) for one in predicted.starts]
-    made = max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
-    if made.evidence > predicted.evidence - TUNING.search.little:
-        return made
+    return max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
 
-    again = [(predicted.starts[0].start, tuple(0 for _ in model.chosen), model.fitted.u)]
+
+def _from_elsewhere(search: EffectSearch, predicted: Predicted, made: Model) -> Model:
+    """The same without any discrepancy at the start, which may have taken the effect's part; where
+    the fit ended well below the model that it holds also from there, with the effect's strengths
+    at nought.
+    """
+    model, effect = predicted.model, search.problem.stack.rig.effects[predicted.effect]
+    start, u = predicted.starts[0].start, model.fitted.u
+    begins = [(start, tuple(0 for _ in model.chosen), u)]
     if made.evidence <= model.evidence - TUNING.search.little:
         strengths = [p.role == "strength" for p in effect.parameters()]
-        again.append(
-            (np.where(strengths, 0.0, predicted.starts[0].start), model.chosen, model.fitted.u)
-        )
-    others = [_fitted_with(search, predicted, *b) for b in again]
-    return max(made, *others, key=lambda m: m.evidence)
+        begins.append((np.where(strengths, 0.0, start), model.chosen, u))
+    return max((_fitted_with(search, predicted, *b) for b in begins), key=lambda m: m.evidence)
 
 
 def _fitted_with(

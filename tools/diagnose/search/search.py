@@ -3,8 +3,8 @@
 A pass (screen/evidence.py) tells by linear algebra which effects may explain the recordings. The
 likeliest are fitted. Beside the best two fits, and then beside the best pair, another pass tells
 what one more effect would gain. The likeliest of all pairs are fitted too: of two effects each may
-hide the other. Each effect of the best model must stand: the model is fitted without each, from
-where it stands.
+hide the other. Each effect of the best model must stand beside the others: so the model is fitted
+without each too.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def search_models(
 
     tell = counting(step, "fitting the likely effects")
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs, tell)
-    search = _settled(search, jobs)
+    search = _from_each_other(search, jobs)
     tested: Model | None = None
     for size, (starts, most) in enumerate(TUNING.search.later, start=1):
         if begun := search.sized(size)[:starts]:
@@ -66,9 +66,11 @@ def search_models(
 
 def begin(screening: Screening, jobs: int = 1) -> EffectSearch:
     """The base model, the bare one, and what stands out beside it."""
-    bare = _bare(screening, screening.base)
+    base, forms = screening.base, screening.forms
+    start, sizes = (base.fitted.u, np.zeros(0)), base.sizes or tuple(0 for _ in forms)
+    bare = fit_model(screening.problem, forms, (), (), start, sizes, near=base.fitted)
     first = screen(screening, bare, jobs)
-    search = EffectSearch(screening, (screening.base, bare), first, bare, first.effects)
+    search = EffectSearch(screening, (base, bare), first, bare, first.effects)
     if not first.alarmed:
         return search
 
@@ -77,24 +79,6 @@ def begin(screening: Screening, jobs: int = 1) -> EffectSearch:
 
     stand, seen = passed(standing(screening, bare), look, [first.effects])
     return replace(search, stand=stand, passed=seen)
-
-
-def _bare(screening: Screening, start: Model) -> Model:
-    """The model without effects from the constants of another, its discrepancy learnt."""
-    sizes = start.sizes or tuple(0 for _ in screening.forms)
-    begins = (start.fitted.u, np.zeros(0))
-    return fit_model(screening.problem, screening.forms, (), (), begins, sizes, near=start.fitted)
-
-
-def _settled(search: EffectSearch, jobs: int) -> EffectSearch:
-    """With fits of one effect from each other's constants, and the bare model from those of the
-    best: no model may be worse than one that it holds.
-    """
-    search = _from_each_other(search, jobs)
-    again = _bare(search.screening, search.best())
-    if again.evidence <= search.bare.evidence:
-        return search
-    return replace(search, models=(search.base, again, *search.models[2:]))
 
 
 def _from_each_other(search: EffectSearch, jobs: int) -> EffectSearch:
@@ -251,9 +235,8 @@ def _free_near(rig: Rig, name: str, start: Array) -> tuple[Free, ...]:
 
 
 def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
-    """With the best model less each of its effects, fitted from where the best one stands: no
-    effect may owe its place to a fit of the others that ended elsewhere. And with others in the
-    place of one: what alone is as likely as it may be so beside the rest.
+    """With the best model less each of its effects, where that was not fitted: each must stand. And
+    with others in the place of one: what alone is as likely as it may be so beside the rest.
     """
     if len(best.names) < 2:
         return search
@@ -261,7 +244,8 @@ def _retested(search: EffectSearch, best: Model, jobs: int) -> EffectSearch:
     def changed(change: tuple[str, Model | None]) -> Model | None:
         return attempted(lambda: _acting(search, _changed(search, best, *change)))
 
-    changes = [*((name, None) for name in best.names), *_rivals(search, best)]
+    names = [name for name in best.names if not search.has({*best.names} - {name})]
+    changes = [*((name, None) for name in names), *_rivals(search, best)]
     made = each(jobs, changed, changes, shared(search))
     again = [model for model in made if model is not None]
     return replace(search, models=tuple(_the_better((*search.models, *again))))

@@ -24,6 +24,7 @@ from gritd.tools.diagnose.search import search as searching
 from gritd.tools.diagnose.search.foretold import Predicted, gains, together
 from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.search.search import (
+    _changed,
     _fitted_with,
     _free_near,
     _from_each_other,
@@ -139,19 +140,40 @@ def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:
 
 
 def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
-    """A model of one effect whose fit got stuck is fitted again from the model of two."""
+    """The best model less an effect that was not fitted alone is, from where the model stands; and
+    it is as likely as if its fit had begun by itself.
+    """
     search = searched(make("bulldozing", {"share": 0.75}))
     alone = extended(search, [search.bare], 1, 1)
     (one,) = alone.models[2:]
     two = _with_effect(alone, offered(one, "viscous_friction", [0.1], one.chosen))
-    stuck = replace(one, evidence=one.evidence - 200.0)
-    caught = replace(search, models=(search.base, search.bare, stuck, two))
+    caught = replace(search, models=(search.base, search.bare, two))
     assert caught.best() is two
 
     free = _retested(caught, two, 1)
     again = next(m for m in free.models if m.names == one.names)
     assert again.evidence == pytest.approx(one.evidence, abs=0.5)
     assert free.best() is again
+
+
+def test_fits_end_where_they_end_whatever_they_begin_from() -> None:
+    """No second fit is made of a model: the one without effects and that of one effect are as
+    likely from where the model of two stands.
+    """
+    search = searched(make("bulldozing", {"share": 0.75}), make("slip_sinkage", {"growth": 0.3}))
+    alone = extended(search, [search.bare], 2, 1)
+    beside = extended(alone, alone.sized(1)[:1], 1, 1)
+    (two,) = beside.sized(2)
+    for name in two.names:
+        (other,) = (n for n in two.names if n != name)
+        known = [m for m in alone.models if m.names == (other,)]
+        if known:
+            again = _changed(beside, two, name)
+            assert again.evidence == pytest.approx(known[0].evidence, abs=1.0)
+    none = fit_model(
+        search.problem, search.screening.forms, (), (), (two.fitted.u, np.zeros(0)), two.sizes
+    )
+    assert none.evidence == pytest.approx(search.bare.evidence, abs=1.0)
 
 
 def test_what_is_nearly_as_likely_is_fitted_from_where_the_other_stands() -> None:

@@ -18,9 +18,9 @@ from gritd.tools.diagnose.rig.recorded import Recorded, measured_of
 from gritd.tools.diagnose.rig.signals import Signals, filled
 from gritd.tools.diagnose.rig.states import states, turned_back, turning
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import LONG_AGO
 
 COURSE = ("wheel_angle", "position", "time", "acceleration", "heat")
-LONG = 1e6  # [rad] the wheel has rolled in a steady state since any other
 HOLDING_NOTE = (
     "The motor holds torque while the wheel stands, so its current at rest tells no offset."
 )
@@ -100,7 +100,7 @@ def covariates(
         "constant": ones,
     }
     if tabled:
-        known |= {name: 0.0 * ones for name in COURSE} | {"rolled": LONG * np.cumsum(ones)}
+        known |= {name: 0.0 * ones for name in COURSE} | {"rolled": LONG_AGO * np.cumsum(ones)}
     return known
 
 

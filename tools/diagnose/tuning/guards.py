@@ -15,5 +15,5 @@ UNCHANGED = 1e-8  # of a channel's largest value: above what a vertical balance 
 ROUNDING = 1e-9  # of a fit's unknown, in its prior σ: nearer to a bound it is on it
 DEPENDENT = 1e-6  # of the largest singular value: columns that do the same
 DAMPING_LEAST = 1e-7  # of a descent's curvature; and of its inverse the most
-SUMMED = 801  # points about each of two densities: half as many move a mean by 0.001 of its σ
 LONG_AGO = 1e6  # [rad] of rolling: what was before a steady state is forgotten
+SUMMED = 801  # points about each of two densities: half as many move a mean by 0.001 of its σ

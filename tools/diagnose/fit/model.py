@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.form_error import baseline_terms, form_errors
+from gritd.tools.diagnose.fit.form_error import added_by, baseline_terms, form_errors
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.random_effect import Kind, RandomEffect
+from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
@@ -165,7 +166,7 @@ def fit_model(
     for number in range(TUNING.numerics.size_rounds):
         known = every
         begun = number < TUNING.numerics.form_rounds
-        if begun or _without_form_errors(fitted, every) or _shrunk(made, fitted):
+        if begun or _without_form_errors(fitted, every) or _shrunk(problem, made, fitted):
             every, made = (*forms, *form_errors(problem.stack, problem.noise, fitted)), fitted
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
@@ -199,12 +200,20 @@ def _without_form_errors(fitted: Fitted, terms: Sequence[RandomEffect]) -> bool:
     return not acting <= {term.name for term in terms}
 
 
-def _shrunk(made: Fitted, fitted: Fitted) -> bool:
-    """Whether an effect does less than half of what it did where its other forms were made: they
+def _shrunk(problem: Problem, made: Fitted, fitted: Fitted) -> bool:
+    """Whether an effect adds less than half of what it did where its other forms were made: they
     would be shares of what is no longer there.
     """
-    before, now = does(made), does(fitted)
-    return any(now[name] < 0.5 * before[name] for name in now)
+    for number in range(len(fitted.effects)):
+        before, now = (added_by(problem.stack, one, number) for one in (made, fitted))
+        if _size(problem, now) < 0.5 * _size(problem, before):
+            return True
+    return False
+
+
+def _size(problem: Problem, added: Array) -> float:
+    """Of what an effect adds (N,), whitened."""
+    return float(np.linalg.norm(whiten(problem.noise, added[:, None])))
 
 
 def does(fitted: Fitted) -> dict[str, float]:

@@ -161,15 +161,11 @@ def test_fits_end_where_they_end_whatever_they_begin_from() -> None:
     likely from where the model of two stands.
     """
     search = searched(make("bulldozing", {"share": 0.75}), make("slip_sinkage", {"growth": 0.3}))
-    alone = extended(search, [search.bare], 2, 1)
-    beside = extended(alone, alone.sized(1)[:1], 1, 1)
-    (two,) = beside.sized(2)
-    for name in two.names:
-        (other,) = (n for n in two.names if n != name)
-        known = [m for m in alone.models if m.names == (other,)]
-        if known:
-            again = _changed(beside, two, name)
-            assert again.evidence == pytest.approx(known[0].evidence, abs=1.0)
+    alone = extended(search, [search.bare], 1, 1)
+    (one,) = alone.sized(1)
+    (two,) = extended(alone, [one], 1, 1).sized(2)
+    (added,) = {*two.names} - {*one.names}
+    assert _changed(alone, two, added).evidence == pytest.approx(one.evidence, abs=1.0)
     none = fit_model(
         search.problem, search.screening.forms, (), (), (two.fitted.u, np.zeros(0)), two.sizes
     )

@@ -74,7 +74,7 @@ def _stronger(row: dict[str, str]) -> dict[str, str]:
 def _panels(recording: Path, configuration: Path, applied: Path) -> list[Panel]:
     """Each channel of a run with lugs over time."""
     judge = Judge([recording], configuration)
-    before, after = judge.predicted(None)[0], Judge([recording], applied).predicted(None)[0]
+    before, after = judge.predicted()[0], Judge([recording], applied).predicted()[0]
     panels = []
     for channel, (label, factor) in CHANNELS.items():
         series = (judge.measured(0, channel), before[channel], after[channel])

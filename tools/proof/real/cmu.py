@@ -84,7 +84,7 @@ def _conditions(judges: Sequence[Judge]) -> dict[str, Array]:
     """
     judge = judges[0]
     models: list[Sequence[Mapping[str, Array]]] = [[run.measured for run in judge.rig.runs]]
-    models += [j.predicted(None) for j in judges]
+    models += [j.predicted() for j in judges]
 
     out = {}
     for channel, (_, factor) in CHANNELS.items():

@@ -34,9 +34,9 @@ def _run(bench: CommandBench) -> Finding:
 
     models = (
         [r.measured for r in judge.rig.runs],
-        Judge(recordings, published / configuration.name).predicted(None),
-        judge.predicted(diagnosis.result, "before"),
+        Judge(recordings, published / configuration.name).predicted(),
         judge.predicted(diagnosis.result),
+        Judge(recordings, bench.folder / "ding-smooth.yaml").predicted(),
     )
 
     panels, columns = [], []

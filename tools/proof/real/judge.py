@@ -41,16 +41,13 @@ class Judge:
         """A channel of a run (n,), in its unit."""
         return np.asarray(self.rig.runs[run].measured[channel])
 
-    def predicted(
-        self, diagnosis: dict[str, Any] | None, when: str = "after"
-    ) -> list[dict[str, Array]]:
-        """Every channel (n,) of every run: by the configuration alone (None), 'before' with the
-        soil fitted without effects, 'after' with both.
+    def predicted(self, diagnosis: dict[str, Any] | None = None) -> list[dict[str, Array]]:
+        """Every channel (n,) of every run: by the configuration alone, or with the soil that a
+        diagnosis fitted without effects.
         """
-        if diagnosis is None:
-            return self.rig.predict(np.zeros(len(self.rig.constants)), ())
+        known = np.zeros(len(self.rig.constants))
         return self.rig.predict(
-            self._constants(diagnosis, when), effects(diagnosis) if when == "after" else ()
+            known if diagnosis is None else self._constants(diagnosis, "before"), ()
         )
 
     def freed(self, diagnosis: dict[str, Any], channel: str) -> list[Array]:

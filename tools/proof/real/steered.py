@@ -28,7 +28,7 @@ def _run(bench: CommandBench) -> Finding:
             "side_force",
             judge.covariate("slip"),
             [run.measured["side_force"] for run in judge.rig.runs],
-            *([run["side_force"] for run in j.predicted(None)] for j in (before, judge)),
+            *([run["side_force"] for run in j.predicted()] for j in (before, judge)),
         )
         order = np.argsort(curves[0])
         labels = ("measured", "as if straight", "with what was found")

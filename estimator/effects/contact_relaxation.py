@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.history import followed, run_by_run
+from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Balanced, Complete, OnSoil, Reaction, Recall
 from gritd.estimator.terramechanics.soil import Array, Scalar
 
@@ -130,8 +130,8 @@ class ContactRelaxation(Effect):
         """
         run, way = situation.run, np.asarray(situation.direction)
         signed = np.abs(way) * (followed(steady, share, run) - steady)
-        size = run_by_run(_size, run, steady, way)
-        begun = run_by_run(_begun, run, size, known)
+        size = _size(steady, way, run)
+        begun = _begun(size, known, run)
         sized = way * (followed(begun, share, run) - size)
         return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
 
@@ -142,21 +142,27 @@ class ContactRelaxation(Effect):
         return np.where(situation.carried > 0.0, -np.expm1(-moved / length), 1.0)
 
 
-def _size(force: Array, way: Array) -> Array:
-    """A force (n,) in the direction of travel, through a rest that of the latest travel."""
-    driven = np.flatnonzero(np.abs(way) > DRIVEN)
-    if not driven.size:
-        return np.zeros(force.size)
-    latest = driven[np.maximum(np.searchsorted(driven, np.arange(force.size), "right") - 1, 0)]
-    return np.asarray(force[latest] / way[latest])
-
-
-def _begun(size: Array, share: Array) -> Array:
-    """The same (n,), the first a mean over the way that the run begins with: at the moment a wheel
-    starts its slip is not known.
+def _size(force: Scalar, way: Array, run: Scalar) -> Array:
+    """A force (n,) in the direction of travel, through a rest that of the latest travel of the run,
+    before that of its first; nought in a run that does not travel.
     """
-    before = followed(size[::-1], np.append(1.0, share[:0:-1]))
-    return np.append(before[-1], size[1:])
+    number = np.arange(way.size)
+    driven = np.abs(way) > DRIVEN
+    first = np.maximum.accumulate(np.where(run_begins(run, way.size), number, 0))
+    latest = np.maximum.accumulate(np.where(driven, number, -1))
+    coming = np.minimum.accumulate(np.where(driven, number, way.size)[::-1])[::-1]
+    at = np.where(latest >= first, latest, np.minimum(coming, way.size - 1))
+    known = driven[at] & (first[at] == first)
+    return np.asarray(np.where(known, np.asarray(force)[at] / np.where(known, way[at], 1.0), 0.0))
+
+
+def _begun(size: Array, share: Array, run: Scalar) -> Array:
+    """The same (n,), the first of a run a mean over the way that it begins with: at the moment a
+    wheel starts its slip is not known.
+    """
+    back = np.broadcast_to(run, size.size)[::-1]
+    before = followed(size[::-1], np.append(1.0, share[:0:-1]), back)[::-1]
+    return np.where(run_begins(run, size.size), before, size)
 
 
 def _mobilising(situation: OnSoil) -> Scalar:

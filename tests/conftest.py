@@ -6,6 +6,7 @@ command: the tests themselves run side by side, and sums in another order end in
 
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -18,3 +19,8 @@ settings.register_profile(
     "explore", deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("gritd")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest begin first, so that none is left for one worker when all others have ended."""
+    items.sort(key=lambda item: item.get_closest_marker("first") is None)

@@ -49,6 +49,7 @@ def test_a_quiet_rig_gives_no_alarm() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.first
 @pytest.mark.parametrize(("slow_time", "allowed"), [(0.3, 0), (1.0, 1), (3.0, 1)])
 def test_coloured_noise_of_unknown_size_gives_no_alarm(slow_time: float, allowed: int) -> None:
     """iid tests cry wolf; the configured noise is half or twice the true one. Of 120 campaigns 2 %

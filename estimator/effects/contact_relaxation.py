@@ -128,7 +128,7 @@ class ContactRelaxation(Effect):
         """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too. share,
         known: of the way to y∞ (n,), over Λ and until the slip is known.
         """
-        run, way = situation.run, np.asarray(situation.direction)
+        run, way = situation.run, np.broadcast_to(situation.direction, share.shape)
         signed = np.abs(way) * (followed(steady, share, run) - steady)
         size = _size(steady, way, run)
         begun = _begun(size, known, run)

@@ -81,6 +81,19 @@ def test_sinkage_has_a_length_of_its_own_and_the_path_is_that_of_rim_or_axle(
     np.testing.assert_allclose(found[250:], expected[250:], rtol=1e-9)
 
 
+@pytest.mark.parametrize("name", list(EFFECTS))
+def test_a_speed_that_does_not_vary_may_be_one_number(name: str) -> None:
+    motion = driven(stepped(40.0, 90.0), np.full(1000, 0.2), np.full(1000, 0.3))
+    travel = float(np.ravel(motion.carriage_speed)[0])
+    steady = replace(motion, wheel_speed=0.3, carriage_speed=travel)
+    found, alike = (
+        simulate_arrays(WHEEL, SOIL, m, (typical(EFFECTS[name]),)) for m in (motion, steady)
+    )
+    np.testing.assert_allclose(alike.sensed.current, found.sensed.current, rtol=1e-9)
+    np.testing.assert_allclose(alike.sensed.drawbar_pull, found.sensed.drawbar_pull, rtol=1e-9)
+    np.testing.assert_allclose(alike.sensed.sinkage, found.sensed.sinkage, rtol=1e-9)
+
+
 def test_the_load_is_carried_at_once() -> None:
     motion = driven(stepped(40.0, 90.0), np.full(1000, 0.2), np.full(1000, 0.3))
     found = simulate_arrays(WHEEL, SOIL, motion, (typical(EFFECTS["contact_relaxation"]),))

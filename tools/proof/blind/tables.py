@@ -10,6 +10,7 @@ from gritd.tools.proof.blind.verdicts import CaseRow
 
 Table = list[tuple[str, ...]]  # rows of cells, all as long as the first
 GAP = "  "
+NONE = "–"  # what no case asks
 
 
 def text(score: Mapping[str, Any], rows: Sequence[CaseRow]) -> str:
@@ -20,7 +21,7 @@ def text(score: Mapping[str, Any], rows: Sequence[CaseRow]) -> str:
 
 
 def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
-    """By heading; those without a row beside their head are left out."""
+    """By heading; rows of which no case of the batch asks are left out, and tables without one."""
     tables = {
         "Figures": headline(score),
         "By stratum and strength": strata(score),
@@ -37,7 +38,18 @@ def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
         "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
     }
 
-    return {heading: table for heading, table in tables.items() if len(table) > 1}
+    asked = {heading: _asked(table) for heading, table in tables.items()}
+    return {heading: table for heading, table in asked.items() if len(table) > 1}
+
+
+def _asked(table: Table) -> Table:
+    """Without what no case asks; a row stays where one that is set in below it does."""
+    kept: Table = []
+    for row in reversed(table):
+        above = bool(kept) and kept[-1][0].startswith(" ") and not row[0].startswith(" ")
+        if above or any(cell != NONE for cell in row[1:]):
+            kept.append(row)
+    return kept[::-1]
 
 
 def aligned(table: Table) -> str:
@@ -53,14 +65,14 @@ def aligned(table: Table) -> str:
 def share_text(share: Mapping[str, Any]) -> str:
     """`17/20 85 % (62–97)`; nothing where nothing was asked."""
     if not share["n"]:
-        return "–"
+        return NONE
     value = share["k"] / share["n"]
     bounds = f"({100 * share['low']:.0f}–{100 * share['high']:.0f})"
     return f"{share['k']}/{share['n']} {value:.0%} {bounds}"
 
 
 def number(value: float | None, form: str = ".2f") -> str:
-    return "–" if value is None else format(value, form)
+    return NONE if value is None else format(value, form)
 
 
 def headline(score: Mapping[str, Any]) -> Table:

@@ -298,6 +298,14 @@ def test_every_table_has_its_heading_and_no_ragged_row() -> None:
         assert f"<h2>{heading}</h2>" in text
 
 
+def test_what_no_case_asks_is_not_shown() -> None:
+    counted = score.score([pair(single("bed_slope", said("bed_slope")))])
+    shown = tables.all_tables(counted)
+    assert not [row for t in shown.values() for row in t if set(row[1:]) <= {tables.NONE}]
+    assert "A reference campaign, then a new one" in shown
+    assert "Campaigns alone in foreign worlds" not in shown
+
+
 def test_the_page_stands_alone() -> None:
     rows = [NOBODY, single("bed_slope", said("<script>"))]
     text = page.page(score.score(rows), rows, "ab" * 32)

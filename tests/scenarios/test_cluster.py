@@ -22,7 +22,10 @@ from tests.scenarios.rig import ROOT, until
 from tests.tools.commands.certificates import certificates
 
 pytest.importorskip("distributed", reason="dask.distributed is not installed")
-pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is missing")
+pytestmark = [
+    pytest.mark.slow,  # needs a scheduler
+    pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is missing"),
+]
 
 CLUSTER = "dask: worker killed, hung, of another version; TLS"
 LEVEL = "scheduler, workers and command as processes"

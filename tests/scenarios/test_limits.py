@@ -31,6 +31,8 @@ from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
 from tests.scenarios.hostile import bomb, honest, later, mcap, record, tiny_chunks, watched
 from tests.scenarios.rig import TESTBED, driven
 
+pytestmark = pytest.mark.slow  # each is as costly as a file may be
+
 BOMB = "recording that unpacks to a thousand times its size"
 MANY = "empty attachments, tiny chunks"
 LATER = "last reading a day, fifty years later"

@@ -15,7 +15,6 @@ from gritd.tools.dev import soil_changes as changes
 from tests.scenarios.recorded import log_lines, verified
 from tests.scenarios.rig import WIRES, driven, service
 
-QUICK = True
 CHANGES = "step, ramp or patch of the soil"
 DEPTH = "a filter out of its depth"
 CASES = "windows and filter, testbed simulated"

@@ -14,7 +14,7 @@ from gritd.tools.bench import against, diagnosis, forward, live, measure, peers
 from gritd.tools.testbed.simulation import soil_of
 from tests.tools.bench.samples import FIGURES
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 
 SMALL = measure.BenchSizes(
     seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0

@@ -31,8 +31,6 @@ from tests.scenarios.commands import AS_PROCESSES, CONFIG, in_process
 from tests.scenarios.hostile import bomb, honest, later, mcap, record, tiny_chunks, watched
 from tests.scenarios.rig import TESTBED, driven
 
-pytestmark = pytest.mark.slow  # each is as costly as a file may be
-
 BOMB = "recording that unpacks to a thousand times its size"
 MANY = "empty attachments, tiny chunks"
 LATER = "last reading a day, fifty years later"
@@ -92,6 +90,7 @@ def _driven(folder, load, acting):
     return run
 
 
+@pytest.mark.slow
 def test_the_limit_can_be_raised(tmp_path):
     """By whoever trusts the file and has the memory."""
     path = tmp_path / "a.mcap"
@@ -102,6 +101,7 @@ def test_the_limit_can_be_raised(tmp_path):
     assert wrong.code == 2 and wrong.one_line
 
 
+@pytest.mark.slow
 def test_records_that_cost_time_and_hold_nothing(tmp_path, figure):
     """30 MB of attachments, 140 MB of chunks with one reading each, and bare messages."""
     attachment = record(9, struct.pack("<QQIIQI", 0, 0, 0, 0, 0, 0))
@@ -147,6 +147,7 @@ def test_a_reading_much_later(tmp_path, command, gap, figure):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "bound"),
     [
@@ -165,6 +166,7 @@ def test_a_sparse_file_is_hashed_piece_by_piece(tmp_path, size, bound, figure):
     figure(SPARSE, AS_PROCESSES, "processor time", done.seconds, "s", 60, real=True)
 
 
+@pytest.mark.slow
 def test_packed_text(tmp_path, figure):
     """2 MB of gzip in an import: rows without end, and a line without end."""
     for name, unpacked in (("rows", b"0.5," * 99 + b"0\n"), ("line", b"0" * 400)):
@@ -180,6 +182,7 @@ def test_packed_text(tmp_path, figure):
         figure(PACKED, AS_PROCESSES, "processor time", done.seconds, "s", 10, real=True)
 
 
+@pytest.mark.slow
 def test_chunks_in_another_order(tmp_path, figure):
     """Every exchange of two chunks of a recording, and each chunk twice: `recover` says so."""
     path = tmp_path / "a.mcap"
@@ -345,6 +348,7 @@ def filtered(settings):
 COMMANDS = ("replay", "recover", "compare", "diagnose", "simulate", "check-config", "reproduce")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [100, 300, 500])
 def test_little_address_space(tmp_path, size, figure):
     """Every command does its work or ends with one line."""

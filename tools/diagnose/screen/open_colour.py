@@ -41,18 +41,22 @@ from gritd.tools.diagnose.noise.colour import (
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.tuning.guards import SLIGHT
+from gritd.tools.diagnose.tuning.guards import RIDGE, SLIGHT
 
 
 @dataclass(frozen=True)
 class Squares:
     """Products of a channel's whitened columns, for each colour (g, m, m); log det of the
-    correlation (g,); values.
+    correlation (g,); values. The same of the signatures and y in this channel alone, with the
+    base eliminated: left (g, r, r), log det (g,) and free values.
     """
 
     gram: Array
     log_det: Array
     count: int
+    left: Array
+    left_log_det: Array
+    free: int
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,8 @@ class OpenNoise:
         self._prior = log_prior(self._colours, stack.gaps)
 
         def squares(own: Bools) -> Squares:
-            return _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
+            of = columns[own], stack.gaps_of(own), problem.noise, own, self._colours
+            return _squares(*of, self._base.size)
 
         channels = (stack.of(channel) for channel in stack.rig.channels)
         self._squares = each(jobs, squares, [own for own in channels if own.any()])
@@ -113,7 +118,7 @@ class OpenNoise:
         prior = np.ones((len(scales), index.size - 1))
         prior[:, self._base.size :] = scales[:, None] ** -2
 
-        parts = [self._suiting(squares, index) for squares in self._squares]
+        parts = [self._suiting(squares, more) for squares in self._squares]
         at = [
             int(np.argmax(part.rest - 0.5 * part.count * np.log(part.variance))) for part in parts
         ]
@@ -134,23 +139,26 @@ class OpenNoise:
                 peaks.append((float(value.max()), float(logsumexp(value))))
         return peaks[-1][0] + sum(average - top for top, average in peaks)
 
-    def _suiting(self, squares: Squares, index: Index) -> SuitableColours:
-        gram = squares.gram[:, index[:, None], index]
-        acting = np.flatnonzero(np.diagonal(gram[0]) > 0.0)
+    def _suiting(self, squares: Squares, more: Index) -> SuitableColours:
+        own = np.append(more, self._y)
+        left = squares.left[:, own[:, None] - self._base.size, own - self._base.size]
+        acting = np.flatnonzero(np.diagonal(left[0]) > 0.0)
         alone, variance = restricted(
-            gram[:, acting[:, None], acting], squares.log_det, squares.count
+            left[:, acting[:, None], acting], squares.left_log_det, squares.free
         )
         near = np.flatnonzero(
             alone + self._prior > (alone + self._prior).max() - TUNING.numerics.colour_near
         )
         rest = self._prior[near] - 0.5 * squares.log_det[near]
-        return SuitableColours(gram[near], rest, variance[near], squares.count)
+        index = np.concatenate((self._base, own))
+        gram = squares.gram[near[:, None, None], index[:, None], index]
+        return SuitableColours(gram, rest, variance[near], squares.count)
 
 
 def _squares(
-    columns: Array, gaps: Array, noise: Noise, own: Bools, tried: Sequence[Colour]
+    columns: Array, gaps: Array, noise: Noise, own: Bools, tried: Sequence[Colour], base: int
 ) -> Squares:
-    """Of one channel's columns (n, m), its values marked (N,).
+    """Of one channel's columns (n, m), so many of the base first, its values marked (N,).
 
     What is uncertain of single values is known in the channel's unit. Of a colour the recordings
     tell the size of its innovations: by these the colours are of equal size.
@@ -162,7 +170,21 @@ def _squares(
 
     beside = noise.beside[own][:, None] * share
     gram, log_det = products_of_innovations(columns / noise.times[own, None], gaps, tried, beside)
-    return Squares(gram, log_det, len(columns))
+    return Squares(gram, log_det, len(columns), *_left(gram, log_det, len(columns), base))
+
+
+def _left(gram: Array, log_det: Array, count: int, base: int) -> tuple[Array, Array, int]:
+    """Of products (g, m, m) what is left with the columns of the base eliminated, whatever their
+    size: products, log det and free values (estimate.restricted).
+    """
+    acting = np.flatnonzero(np.diagonal(gram[0])[:base] > 0.0)
+    order = np.concatenate((acting, np.arange(base, gram.shape[1])))
+    own = gram[:, order[:, None], order]
+    diagonal = np.einsum("...ii->...i", own)[:, :-1]  # a view
+    usual = diagonal[:, : acting.size].sum(axis=1, keepdims=True) / max(acting.size, 1)
+    diagonal += RIDGE * usual * (diagonal > 0.0)
+    left, spread = _eliminated(own, acting.size)
+    return left, log_det + 2.0 * spread, max(count - acting.size, 1)
 
 
 def _term(part: SuitableColours, at: int, size: float) -> tuple[Array, float]:
@@ -175,17 +197,26 @@ def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array,
     """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors
     (s, p).
     """
-    products, more = sum(o[0] for o in others), sum(o[1] for o in others)
-    # the first columns have one prior, whatever the size of the rest: eliminated once
+    products = sum((o[0] for o in others), np.zeros(part.gram.shape[1:]))
+    more = sum(o[1] for o in others)
+    # the first columns have one prior, whatever the size of the rest: eliminated once for all
+    # sizes, and those that do nothing in this channel for all colours too
     alike = int(np.argmin(np.append(np.all(prior == prior[0], axis=0), False)))
+    acts = np.diagonal(part.gram[0]) > 0.0
+    elsewhere = np.flatnonzero(~acts[:alike])
+    here = np.concatenate((np.flatnonzero(acts[:alike]), np.arange(alike, acts.size)))
+    first = here.size - (acts.size - alike)
+    order = np.concatenate((elsewhere, here))
+    beside, apart = _without_first(products[order[:, None], order], prior[0, elsewhere])
+    own = part.gram[:, here[:, None], here]
 
     averaged = []
     for size in TUNING.screen.colour_sizes:  # one at a time: the products take memory
         variance = part.variance * size**2
-        gram = part.gram / variance[:, None, None] + products
-        rest, spread = _without_first(gram, prior[0, :alike])
+        gram = own / variance[:, None, None] + beside
+        rest, spread = _without_first(gram, prior[0, here[:first]])
         every = [_log_evidence(rest, p[alike:]) for p in prior]
-        added = part.rest - 0.5 * part.count * np.log(variance) + more
+        added = part.rest - 0.5 * part.count * np.log(variance) + more - apart
         averaged.append(logsumexp(every, axis=0) - np.log(len(prior)) - spread + added)
     return np.stack(averaged, axis=1)
 
@@ -194,10 +225,19 @@ def _without_first(gram: Array, prior: Array) -> tuple[Array, Array]:
     """Products (…, p + 1, p + 1) of columns and y with the first columns eliminated, of prior
     precision (f,), and half of what these add to the log determinant.
     """
-    first = prior.size
+    with_prior = gram.copy()
+    diagonal = np.einsum("...ii->...i", with_prior)[..., : prior.size]  # a view
+    diagonal[...] = _with_prior(diagonal, prior)
+    rest, spread = _eliminated(with_prior, prior.size)
+    return rest, spread - 0.5 * float(np.log(prior).sum())
+
+
+def _eliminated(gram: Array, first: int) -> tuple[Array, Array]:
+    """Products (…, m, m) with so many of the first columns eliminated, and half of their log
+    determinant.
+    """
     padded = gram.copy()
     diagonal = np.einsum("...ii->...i", padded)  # a view
-    diagonal[..., :first] = _with_prior(diagonal[..., :first], prior)
     # of the rest the root's last rows are not wanted: anything that keeps it positive
     diagonal[..., first:] += 1.0 + diagonal[..., first:].sum(axis=-1, keepdims=True)
 
@@ -205,7 +245,7 @@ def _without_first(gram: Array, prior: Array) -> tuple[Array, Array]:
     across = root[..., first:, :first]
     own = np.log(np.diagonal(root, axis1=-2, axis2=-1)[..., :first]).sum(axis=-1)
     rest = gram[..., first:, first:] - across @ across.swapaxes(-1, -2)
-    return np.asarray(rest), np.asarray(own - 0.5 * np.log(prior).sum())
+    return np.asarray(rest), np.asarray(own)
 
 
 def _log_evidence(gram: Array, prior: Array) -> Array:

@@ -46,7 +46,7 @@ class Numerics:
 
     # --- what is left out ---
     slight_size: float = 1e-3  # weight of sizes below which they do not count
-    shared_least: float = 0.3  # [squares of the noise] a direction that shows less is left out
+    shown_least: float = 0.03  # [squares of the noise] a direction that shows less is left out
     shared_most: int = 150  # directions of all effects in both campaigns
     negligible: float = 1e-5  # weight of a value long past in an innovation: it is left out
     rank: float = 1e-7  # of the largest eigenvalue: smaller ones are dependent columns

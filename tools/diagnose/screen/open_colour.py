@@ -182,7 +182,7 @@ def _left(gram: Array, log_det: Array, count: int, base: int) -> tuple[Array, Ar
     own = gram[:, order[:, None], order]
     diagonal = np.einsum("...ii->...i", own)[:, :-1]  # a view
     usual = diagonal[:, : acting.size].sum(axis=1, keepdims=True) / max(acting.size, 1)
-    diagonal += RIDGE * usual * (diagonal > 0.0)
+    diagonal += RIDGE * np.where(diagonal > 0.0, np.maximum(usual, diagonal), 0.0)
     left, spread = _eliminated(own, acting.size)
     return left, log_det + 2.0 * spread, max(count - acting.size, 1)
 

@@ -16,9 +16,18 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.noise.estimate import restricted
 from gritd.tools.diagnose.rig.wheel import wheel_rig
 from gritd.tools.diagnose.screen import screening as module
-from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence, _without_first
+from gritd.tools.diagnose.screen.open_colour import (
+    OpenNoise,
+    SuitableColours,
+    _averaged,
+    _left,
+    _log_evidence,
+    _term,
+    _without_first,
+)
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.models import EffectSearch
 from gritd.tools.diagnose.search.search import begin
@@ -138,3 +147,47 @@ def test_columns_may_be_eliminated_one_after_the_other(first: int) -> None:
     rest, spread = _without_first(gram, prior[:first])
     parts = _log_evidence(rest, prior[first:]) - spread
     np.testing.assert_allclose(parts, _log_evidence(gram, prior), rtol=1e-9)
+
+
+def test_a_channel_of_open_colour_has_the_evidence_of_all_columns_at_once() -> None:
+    """Columns that do nothing in it, or nothing in the others, count as all others do."""
+    rng = np.random.default_rng(11)
+    here, elsewhere = rng.standard_normal((2, 3, 40, 6))
+    here[..., [0, 2]] = 0.0
+    elsewhere[..., [1, 4]] = 0.0
+    one, other = (
+        SuitableColours(c.swapaxes(1, 2) @ c, rng.standard_normal(3), rng.uniform(0.5, 2.0, 3), 40)
+        for c in (here, elsewhere)
+    )
+    prior = np.ones((2, 5))
+    prior[:, 3:] = [[1.0, 1.0], [4.0, 4.0]]
+
+    found = _averaged(one, prior, [_term(other, 1, 1.0)])
+    for number, size in enumerate(TUNING.screen.colour_sizes):
+        for colour in range(3):
+            terms = [_term(one, colour, size), _term(other, 1, 1.0)]
+            gram, more = sum(t[0] for t in terms), sum(t[1] for t in terms)
+            each = [_log_evidence(gram, p) + more for p in prior]
+            wanted = np.logaddexp(*each) - np.log(2.0)
+            assert found[colour, number] == pytest.approx(wanted, abs=1e-8)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e8])
+def test_the_colours_that_suit_a_channel_are_those_of_all_columns_at_once(size: float) -> None:
+    """Also where a signature is a column of the base, and large."""
+    rng = np.random.default_rng(13)
+    columns = rng.standard_normal((3, 60, 6))
+    columns[..., 1] = 0.0  # does nothing here
+    columns[..., 4] = size * columns[..., 0]
+    gram, log_det = columns.swapaxes(1, 2) @ columns, rng.standard_normal(3)
+
+    left, more, free = _left(gram, log_det, 60, 3)
+    own = np.array([0, 2])  # one signature, and y
+    likelihood, variance = restricted(left[:, own[:, None], own], more, free)
+    every = np.array([0, 2, 3, 5])
+    wanted = restricted(gram[:, every[:, None], every], log_det, 60)
+    np.testing.assert_allclose(likelihood, wanted[0], rtol=1e-6)
+    np.testing.assert_allclose(variance, wanted[1], rtol=1e-6)
+
+    own = np.array([0, 1, 2])
+    assert np.isfinite(restricted(left[:, own[:, None], own], more, free)).all()

@@ -6,7 +6,10 @@ from collections.abc import Mapping, Sequence
 from math import hypot
 from typing import Any
 
+import numpy as np
+
 from gritd.estimator.effects import EFFECTS
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strained, strains
@@ -15,6 +18,7 @@ from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.profile import profile_of
+from gritd.tools.diagnose.explain.reach import reached
 from gritd.tools.diagnose.explain.remainder import discrepancies, missed_words, remainders
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
@@ -133,12 +137,13 @@ def _hypotheses(
         best = decision.best if accepted else resembled.get(name, likeliest)
         alike = _alike(decision, name)
         forms = best.form_share(name) if best else 0.0
+        far = reached(search, best, name) if accepted and best else None
         out.append(
             Hypothesis(
                 effect=name,
                 probability=probability,
                 heldout_gain_nats=_gain(before, best, every) if best else 0.0,
-                parameters=parameters(rig, best, name, forms) if best else {},
+                parameters=parameters(rig, best, name, forms, far) if best else {},
                 indistinguishable_from=alike,
                 accepted=accepted,
                 sentence=EFFECTS[name].sentence(),
@@ -194,14 +199,19 @@ def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]])
     return min(gains, default=0.0)
 
 
-def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[str, Quantity]:
+def parameters(
+    rig: Rig, model: Model, name: str, forms: float = 0.0, far: Array | None = None
+) -> dict[str, Quantity]:
     """What a model says of an effect's parameters, in what their units mean for the rig.
 
     forms: the share by which another form of the effect may differ. Its strength differs by as
-    much: the fit alone knows a strength as if our formula were exact.
+    much: the fit alone knows a strength as if our formula were exact. far: (p,) σ of the model's
+    parameters where the fit's are too small (`reach.py`), in expected sizes.
     """
     found = {}
-    for f, x, s in zip(model.fitted.free, *model.parameters(), strict=True):
+    mean, sigma = model.parameters()
+    sigma = sigma if far is None else np.maximum(sigma, far)
+    for f, x, s in zip(model.fitted.free, mean, sigma, strict=True):
         if f.name == name and (p := f.parameter):
             value, own = f.value(float(x)), float(s) * p.sigma
             unit = rig.unit_factors.get(p.unit, 1.0)

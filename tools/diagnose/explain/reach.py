@@ -1,0 +1,115 @@
+"""How far the parameters of an effect may be from where they were fitted.
+
+The σ of a fit is that of a valley which is straight. Where a strength and the shapes of an effect
+make up for each other the valley is bent, and its floor may be flat far beyond that σ: an angle
+shows in a side force as its tangent times a share that is hardly known. So each strength is moved
+by two of its σ, and all else with it as straight lines would have it. If the fit then loses what
+such lines foretell, they hold. If not, the strength is held farther and farther off, and all else
+fitted again: two σ reach to where the evidence has fallen by as much as theirs would let it (the
+profile of a likelihood: Bates and Watts 1988, Nonlinear Regression Analysis and Its Applications,
+ch. 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.attempt import attempted
+from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.problem import Fitted, Free, Problem
+from gritd.tools.diagnose.search.models import EffectSearch
+from gritd.tools.diagnose.tuning.guards import ROUNDING
+
+SIGMAS = 2.0  # by which a strength is moved
+LOST = 0.5 * SIGMAS**2  # [nats] that it loses then, where the valley is straight
+
+
+def reached(search: EffectSearch, model: Model, name: str) -> Array:
+    """Half of how far each parameter of a model (p,), in expected sizes, may be from its mean as
+    the strengths of one of its effects move; 0 where straight lines hold.
+    """
+    fitted = model.fitted
+    mean, sigma = model.parameters()
+    most = np.zeros_like(mean)
+    for number, free in enumerate(fitted.free):
+        if free.name != name or free.parameter.role != "strength":
+            continue
+        if not fitted.held[fitted.u.size + number] and not _straight(search.problem, model, number):
+            for side in (-1.0, 1.0):
+                for x in _profile(search, model, number, side * SIGMAS * float(sigma[number])):
+                    most = np.maximum(most, np.abs(x - mean))
+    return most / SIGMAS
+
+
+def _straight(problem: Problem, model: Model, number: int) -> bool:
+    """Whether a fit loses about what straight lines foretell where one parameter is moved either
+    way, and all else with it.
+    """
+    fitted, place = model.fitted, model.fitted.u.size + number
+    ground = problem.with_terms(
+        [term for term, _ in fitted.nuisance.parts[1:]],
+        [size for _, size in fitted.nuisance.parts[1:]],
+    ).ground(fitted.effects, fitted.free)
+    covariance = fitted.covariance()[: fitted.centre.size, place]
+    step = SIGMAS * covariance / np.sqrt(covariance[place])
+    for way in (step, -step):
+        moved = ground.bounds.clipped(fitted.centre + way) - fitted.centre
+        foretold = fitted.gradient @ moved + 0.5 * moved @ fitted.curvature @ moved
+        lost = ground.tried(fitted.centre + moved)[1] - fitted.nats
+        if not abs(lost - foretold) < 0.5 * LOST:
+            return False
+    return True
+
+
+def _profile(search: EffectSearch, model: Model, number: int, step: float) -> Iterator[Array]:
+    """Parameters (p,) of fits in which one is held farther and farther off its mean, each time
+    twice as far, while the evidence has not fallen by LOST; last where it has, by a straight line
+    from the one before.
+    """
+    fitted = model.fitted
+    own = fitted.free[number]
+    centre, low, high = own.parameter.centre, own.parameter.low, own.parameter.high
+    ends = sorted(((low - centre) / own.parameter.sigma, (high - centre) / own.parameter.sigma))
+    at = float(fitted.x[number])
+    begins = _held(search, model, fitted, number, at)
+    if begins is None:
+        return
+    here, fallen = begins, 0.0
+    while ends[0] < here.fitted.x[number] - ROUNDING or here.fitted.x[number] < ends[1] - ROUNDING:
+        there = _held(search, model, here.fitted, number, min(max(at + step, ends[0]), ends[1]))
+        if there is None:
+            return
+        below = max(begins.evidence - there.evidence, 0.0)
+        if below > LOST:
+            share = (np.sqrt(LOST) - np.sqrt(fallen)) / (np.sqrt(below) - np.sqrt(fallen))
+            yield here.fitted.x + share * (there.fitted.x - here.fitted.x)
+            return
+        yield there.fitted.x
+        if there.fitted.x[number] == here.fitted.x[number]:
+            return
+        here, fallen, step = there, below, 2.0 * step
+
+
+def _held(search: EffectSearch, model: Model, near: Fitted, number: int, at: float) -> Model | None:
+    """The model with one of its effects' parameters held; the rest as near by."""
+    free = list(model.fitted.free)
+    free[number] = _fixed(free[number], at)
+    x = near.x.copy()
+    x[number] = at
+    forms = search.screening.forms
+    begins, sizes = (near.u, x), model.sizes
+    return attempted(
+        lambda: fit_model(
+            search.problem, forms, near.effects, tuple(free), begins, sizes, model.other_forms, near
+        )
+    )
+
+
+def _fixed(free: Free, at: float) -> Free:
+    p = free.parameter
+    value = p.centre + at * p.sigma
+    return replace(free, parameter=replace(p, low=value, high=value))

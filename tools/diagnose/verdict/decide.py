@@ -86,10 +86,12 @@ def _log_weight(search: EffectSearch, model: Model, gain: float, functions: int)
 
 
 def _apart(by: OddsCalibration) -> float:
-    """Log odds by which an explanation is out of reach of another, by linear algebra: what a fit
-    may change decides little.
+    """Log odds by which an explanation is out of reach of another by linear algebra, of which a fit
+    may change little, and though the other's law be bent as far as it may.
     """
-    return TUNING.verdict.alike + TUNING.search.little / by.temperature
+    own = TUNING.verdict.form_own
+    bent = float(np.log(max(own) / min(own)))
+    return TUNING.verdict.alike + TUNING.search.little / by.temperature + bent
 
 
 def _rivals(search: EffectSearch, best: Model) -> list[Model]:

@@ -1,13 +1,12 @@
 """How far the parameters of an effect may be from where they were fitted.
 
-The σ of a fit is that of a valley which is straight. Where a strength and the shapes of an effect
-make up for each other the valley is bent, and its floor may be flat far beyond that σ: an angle
-shows in a side force as its tangent times a share that is hardly known. So each strength is moved
-by two of its σ, and all else with it as straight lines would have it. If the fit then loses what
-such lines foretell, they hold. If not, the strength is held farther and farther off, and all else
-fitted again: two σ reach to where the evidence has fallen by as much as theirs would let it (the
-profile of a likelihood: Bates and Watts 1988, Nonlinear Regression Analysis and Its Applications,
-ch. 6).
+The σ of a fit is that of a straight valley. Where a strength and the shapes of an effect make up
+for each other the valley is bent, and its floor may be flat far beyond that σ: an angle shows in a
+side force as its tangent times a share that is hardly known. So each strength is moved by two of
+its σ, and all else with it as straight lines would have it. If the fit then loses what such lines
+foretell, they hold. If not, the strength is held farther and farther off, and all else is fitted
+again: two σ reach to where the evidence has fallen by as much as it would at two σ of a straight
+valley (Bates and Watts 1988, Nonlinear Regression Analysis and Its Applications, ch. 6).
 """
 
 from __future__ import annotations
@@ -22,10 +21,7 @@ from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Problem
 from gritd.tools.diagnose.search.models import EffectSearch
-from gritd.tools.diagnose.tuning.guards import ROUNDING
-
-SIGMAS = 2.0  # by which a strength is moved
-LOST = 0.5 * SIGMAS**2  # [nats] that it loses then, where the valley is straight
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def reached(search: EffectSearch, model: Model, name: str) -> Array:
@@ -40,9 +36,11 @@ def reached(search: EffectSearch, model: Model, name: str) -> Array:
             continue
         if not fitted.held[fitted.u.size + number] and not _straight(search.problem, model, number):
             for side in (-1.0, 1.0):
-                for x in _profile(search, model, number, side * SIGMAS * float(sigma[number])):
+                for x in _profile(
+                    search, model, number, side * TUNING.numerics.reach * float(sigma[number])
+                ):
                     most = np.maximum(most, np.abs(x - mean))
-    return most / SIGMAS
+    return most / TUNING.numerics.reach
 
 
 def _straight(problem: Problem, model: Model, number: int) -> bool:
@@ -55,42 +53,37 @@ def _straight(problem: Problem, model: Model, number: int) -> bool:
         [size for _, size in fitted.nuisance.parts[1:]],
     ).ground(fitted.effects, fitted.free)
     covariance = fitted.covariance()[: fitted.centre.size, place]
-    step = SIGMAS * covariance / np.sqrt(covariance[place])
+    step = TUNING.numerics.reach * covariance / np.sqrt(covariance[place])
     for way in (step, -step):
         moved = ground.bounds.clipped(fitted.centre + way) - fitted.centre
         foretold = fitted.gradient @ moved + 0.5 * moved @ fitted.curvature @ moved
         lost = ground.tried(fitted.centre + moved)[1] - fitted.nats
-        if not abs(lost - foretold) < 0.5 * LOST:
+        if not abs(lost - foretold) < 0.5 * _lost():
             return False
     return True
 
 
 def _profile(search: EffectSearch, model: Model, number: int, step: float) -> Iterator[Array]:
     """Parameters (p,) of fits in which one is held farther and farther off its mean, each time
-    twice as far, while the evidence has not fallen by LOST; last where it has, by a straight line
-    from the one before.
+    twice as far, until the evidence has fallen as it does at so many σ of a straight valley; last
+    where it has, by a straight line from the one before.
     """
-    fitted = model.fitted
-    own = fitted.free[number]
-    centre, low, high = own.parameter.centre, own.parameter.low, own.parameter.high
-    ends = sorted(((low - centre) / own.parameter.sigma, (high - centre) / own.parameter.sigma))
-    at = float(fitted.x[number])
-    begins = _held(search, model, fitted, number, at)
-    if begins is None:
-        return
-    here, fallen = begins, 0.0
-    while ends[0] < here.fitted.x[number] - ROUNDING or here.fitted.x[number] < ends[1] - ROUNDING:
-        there = _held(search, model, here.fitted, number, min(max(at + step, ends[0]), ends[1]))
-        if there is None:
+    own, at = model.fitted.free[number].parameter, float(model.fitted.x[number])
+    ends = sorted((end - own.centre) / own.sigma for end in (own.low, own.high))
+    here = begins = _held(search, model, model.fitted, number, at)
+    fallen, most = 0.0, float(np.sqrt(_lost()))
+    for _ in range(TUNING.numerics.halvings):
+        if here is None or begins is None:
             return
-        below = max(begins.evidence - there.evidence, 0.0)
-        if below > LOST:
-            share = (np.sqrt(LOST) - np.sqrt(fallen)) / (np.sqrt(below) - np.sqrt(fallen))
+        there = _held(search, model, here.fitted, number, min(max(at + step, ends[0]), ends[1]))
+        if there is None or there.fitted.x[number] == here.fitted.x[number]:
+            return
+        below = float(np.sqrt(max(begins.evidence - there.evidence, 0.0)))
+        if below > most:
+            share = (most - fallen) / (below - fallen)
             yield here.fitted.x + share * (there.fitted.x - here.fitted.x)
             return
         yield there.fitted.x
-        if there.fitted.x[number] == here.fitted.x[number]:
-            return
         here, fallen, step = there, below, 2.0 * step
 
 
@@ -107,6 +100,11 @@ def _held(search: EffectSearch, model: Model, near: Fitted, number: int, at: flo
             search.problem, forms, near.effects, tuple(free), begins, sizes, model.other_forms, near
         )
     )
+
+
+def _lost() -> float:
+    """What a move by so many σ loses where the valley is straight [nats]."""
+    return 0.5 * TUNING.numerics.reach**2
 
 
 def _fixed(free: Free, at: float) -> Free:

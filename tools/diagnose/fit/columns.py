@@ -66,21 +66,6 @@ class Columns:
         )
         return Columns(int(before[-1]), blocks)
 
-    def parted(self, last: int) -> tuple[Columns, Columns]:
-        """All columns but so many of the last, and these."""
-        first, before, after = self.count - last, [], []
-        for (rows, own), place in zip(self.blocks, self._places, strict=True):
-            here = max(first - place.start, 0)
-            before.append((rows, own[:, :here]))
-            after.append((rows, own[:, here:]))
-        return Columns(self.size, tuple(before)), Columns(self.size, tuple(after))
-
-    def turned(self, turns: Sequence[Array]) -> Columns:
-        """Of each block combinations (k, j) of its columns."""
-        pairs = zip(self.blocks, turns, strict=True)
-        blocks = [(rows, np.asarray(own @ turn)) for (rows, own), turn in pairs]
-        return replace(self, blocks=tuple(block for block in blocks if block[1].shape[1]))
-
     def times(self, weights: Array) -> Array:
         """What weights (m,) amount to (N,)."""
         out = np.zeros(self.size)

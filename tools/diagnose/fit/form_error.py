@@ -38,14 +38,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.random_effect import (
-    Kind,
-    RandomEffect,
-    Sizes,
-    even,
-    random_effect,
-    shown,
-)
+from gritd.tools.diagnose.fit.random_effect import Kind, RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
@@ -119,8 +112,7 @@ def _forms_of(
         )
         for kind, columns, sizes, least in kinds:
             free = _beside(noise, columns, named)
-            term = random_effect(one.effect.name, free, noise, sizes, least, kind)
-            made.append(shown(term))
+            made.append(random_effect(one.effect.name, free, noise, sizes, least, kind))
     return tuple(made)
 
 

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.fit import descent
 from gritd.tools.diagnose.fit.columns import Columns, joined, whole
 from gritd.tools.diagnose.fit.nuisance import NuisanceColumns
 from gritd.tools.diagnose.fit.projection import Projection
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect, shown
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, random_effect
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Near
 from gritd.tools.diagnose.rig.stack import Stack
@@ -130,9 +130,7 @@ class Problem:
         off by.
         """
         self.stack, self.noise = stack, noise
-        allowed = shown(
-            random_effect("tolerance", tolerance, noise, Sizes()), stack.doubts.shape[1]
-        )
+        allowed = random_effect("tolerance", tolerance, noise, Sizes())
         self.fixed: tuple[RandomEffect, ...] = (allowed,)  # what every fit has
         self.nuisance = NuisanceColumns(((allowed, 1.0),))
         self.measured = whiten(noise, stack.measured)

@@ -8,16 +8,15 @@ all of them. Its size has a prior over a few values. The form of the model has t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.columns import Columns, columns_of, joined, whitened
+from gritd.tools.diagnose.fit.columns import Columns, columns_of, whitened
 from gritd.tools.diagnose.noise.colour import Noise
-from gritd.tools.diagnose.tuning import TUNING
 
 Kind = Literal["", "form", "profile", "place", "law"]
 
@@ -75,31 +74,6 @@ def random_effect(
     """The term of columns (N, m) in the channels' units."""
     own = columns_of(columns)
     return RandomEffect(name, own, whitened(noise, own), sizes, least, kind)
-
-
-def shown(term: RandomEffect, kept: int = 0) -> RandomEffect:
-    """The term less what of it the noise hides at its largest size: of each block of columns the
-    combinations of the same covariance that show, the largest first. kept: how many of the last
-    columns stay as they are.
-    """
-    first, last = term.columns.parted(kept)
-    first_whitened, last_whitened = term.whitened.parted(kept)
-    turns = [leading(own, term.sizes.values[-1]) for _, own in first_whitened.blocks]
-    size = term.columns.size
-    return replace(
-        term,
-        columns=joined(size, (first.turned(turns), last)),
-        whitened=joined(size, (first_whitened.turned(turns), last_whitened)),
-    )
-
-
-def leading(columns: Array, size: float = 1.0) -> Array:
-    """Directions (m, k) of whitened columns (N, m), the largest first, without those that show less
-    than the noise where their weights have this size.
-    """
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    large = np.flatnonzero(size**2 * values > TUNING.numerics.shown_least)[::-1]
-    return np.asarray(vectors[:, large])
 
 
 def products(parts: Sequence[RandomEffect]) -> Array:

@@ -34,7 +34,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, form_sizes, joined, scale_of
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.marginal import Chosen
-from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, leading, random_effect
+from gritd.tools.diagnose.fit.random_effect import RandomEffect, Sizes, even, random_effect
 from gritd.tools.diagnose.fit.ripples import line_waves
 from gritd.tools.diagnose.fit.signatures import raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -218,7 +218,13 @@ def _reduced(columns: Array, whitened: Array) -> Array:
     """Combinations of columns with the same covariance, the largest first; without those that
     are less than the noise altogether.
     """
-    return np.asarray(columns @ leading(whitened)[:, : TUNING.numerics.shared_most])
+    if not columns.shape[1]:
+        return columns
+    values, vectors = np.linalg.eigh(whitened.T @ whitened)
+    large = np.flatnonzero(values > TUNING.numerics.shared_least)[::-1][
+        : TUNING.numerics.shared_most
+    ]
+    return np.asarray(columns @ vectors[:, large])
 
 
 def _level(stack: Stack, parts: Sequence[Index]) -> float:

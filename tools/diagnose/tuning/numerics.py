@@ -30,6 +30,9 @@ class Numerics:
     farthest_start: float = 20.0  # [expected sizes] of any parameter
     least_precision: float = 0.1  # share of its precision that a strength's start keeps
 
+    # --- how far its parameters may be ---
+    reach: float = 2.0  # [σ] by which a strength is moved from where it was fitted
+
     # --- differences ---
     # [prior σ or expected size] for differences: small, for slopes turn where soil gives way
     step: float = 1e-4
@@ -46,7 +49,7 @@ class Numerics:
 
     # --- what is left out ---
     slight_size: float = 1e-3  # weight of sizes below which they do not count
-    shown_least: float = 0.03  # [squares of the noise] a direction that shows less is left out
+    shared_least: float = 0.3  # [squares of the noise] a direction that shows less is left out
     shared_most: int = 150  # directions of all effects in both campaigns
     negligible: float = 1e-5  # weight of a value long past in an innovation: it is left out
     rank: float = 1e-7  # of the largest eigenvalue: smaller ones are dependent columns

@@ -49,12 +49,9 @@ def decide(
     step("weighing what has no name")
     best, by = search.best(), search.calibration
     beside = _beside(search, [search.bare, best] if best.names else [search.bare], jobs)
-    if (known := beside.get(best)) is not None:  # what pays beside it may pay beside its rivals
+    if beside.get(best) is not None:  # what pays beside the best may pay beside its rivals
         tell = counting(step, "weighing what has no name")
-        gain = search.gain(best) + known.gain
-        least = _log_weight(search, best, gain, len(known.functions)) - _apart(by)
-        rivals = _beside(search, _rivals(search, best), jobs, tell, least)
-        beside |= {model: terms for model, terms in rivals.items() if terms is not None}
+        beside |= _beside(search, _rivals(search, best), jobs, tell)
     return judged(search, trusting(search, weigh(search, beside), by), beside, by)
 
 
@@ -63,35 +60,14 @@ def _beside(
     models: Sequence[Model],
     jobs: int,
     tell: Callable[[int, int], None] = lambda done, of: None,
-    least: float = -np.inf,
 ) -> dict[Model, UnexplainedTerms | None]:
-    """What has no name beside each of some models. tell: is given how many of how many are done.
-    least: log weight below which, by linear algebra, a model with it counts for nothing.
-    """
+    """What has no name beside each of some models. tell: is given how many of how many are done."""
 
     def nameless(model: Model) -> UnexplainedTerms | None:
-        def counts(gain: float, functions: int) -> bool:
-            return _log_weight(search, model, search.gain(model) + gain, functions) > least
-
-        return attempted(lambda: unexplained_with(search.screening, model, counts))
+        return _with_unexplained(search, model)
 
     made = each(jobs, nameless, models, shared(search), lambda done: tell(done, len(models)))
     return dict(zip(models, made, strict=True))
-
-
-def _log_weight(search: EffectSearch, model: Model, gain: float, functions: int) -> float:
-    """Of a model with so many functions beside it, of so much evidence above the bare model's."""
-    of = np.array([gain]), np.array([len(model.names)]), np.array([functions])
-    return float(search.calibration.weights(*of)[0])
-
-
-def _apart(by: OddsCalibration) -> float:
-    """Log odds by which an explanation is out of reach of another by linear algebra, of which a fit
-    may change little, and though the other's law be bent as far as it may.
-    """
-    own = TUNING.verdict.form_own
-    bent = float(np.log(max(own) / min(own)))
-    return TUNING.verdict.alike + TUNING.search.little / by.temperature + bent
 
 
 def _rivals(search: EffectSearch, best: Model) -> list[Model]:

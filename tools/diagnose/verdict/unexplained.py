@@ -6,7 +6,7 @@ are the discrepancy of form, which every model has.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,15 +31,9 @@ class UnexplainedTerms:
     gain: float
 
 
-def unexplained_with(
-    screening: Screening,
-    model: Model,
-    counts: Callable[[float, int], bool] = lambda gain, functions: True,
-) -> UnexplainedTerms | None:
+def unexplained_with(screening: Screening, model: Model) -> UnexplainedTerms | None:
     """The functions that act together beside a model, one taken up after the other, while each
     gains by linear algebra more than the choice among all costs; None where none pays for itself.
-
-    counts: whether so much [nats], gained by so many, is worth a fit.
     """
     functions = screening.shapes(model)
     if not functions:
@@ -47,9 +41,8 @@ def unexplained_with(
     beside = without_harmonics(screening.problem, model.fitted)
     kinds = float(np.log(len({s.of for s in functions})))
     parts = parts_of(beside, screening.problem.noise, functions, kinds)
-    found = take_up(parts, range(len(functions)), TUNING.verdict.together)
-    taken = found.parts
-    if not taken or not counts(found.evidence, len(taken)):
+    taken = take_up(parts, range(len(functions)), TUNING.verdict.together).parts
+    if not taken:
         return None
 
     chosen = [functions[k] for k in taken]

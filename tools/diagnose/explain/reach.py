@@ -11,7 +11,7 @@ valley (Bates and Watts 1988, Nonlinear Regression Analysis and Its Applications
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,39 +28,37 @@ def reached(search: EffectSearch, model: Model, name: str) -> Array:
     """Half of how far each parameter of a model (p,), in expected sizes, may be from its mean as
     the strengths of one of its effects move; 0 where straight lines hold.
     """
-    fitted = model.fitted
+    fitted, by = model.fitted, TUNING.numerics.reach
     mean, sigma = model.parameters()
+    own = [
+        n for n, f in enumerate(fitted.free) if f.name == name and f.parameter.role == "strength"
+    ]
+    own = [number for number in own if not fitted.held[fitted.u.size + number]]
     most = np.zeros_like(mean)
-    for number, free in enumerate(fitted.free):
-        if free.name != name or free.parameter.role != "strength":
-            continue
-        if not fitted.held[fitted.u.size + number] and not _straight(search.problem, model, number):
-            for side in (-1.0, 1.0):
-                for x in _profile(
-                    search, model, number, side * TUNING.numerics.reach * float(sigma[number])
-                ):
-                    most = np.maximum(most, np.abs(x - mean))
-    return most / TUNING.numerics.reach
+    for number in _bent(search.problem, fitted, own):
+        for step in (-by * float(sigma[number]), by * float(sigma[number])):
+            for x in _profile(search, model, number, step):
+                most = np.maximum(most, np.abs(x - mean))
+    return most / by
 
 
-def _straight(problem: Problem, model: Model, number: int) -> bool:
-    """Whether a fit loses about what straight lines foretell where one parameter is moved either
-    way, and all else with it.
+def _bent(problem: Problem, fitted: Fitted, numbers: Sequence[int]) -> Iterator[int]:
+    """Of some parameters those of which a fit does not lose about what straight lines foretell
+    where one is moved either way, and all else with it.
     """
-    fitted, place = model.fitted, model.fitted.u.size + number
-    ground = problem.with_terms(
-        [term for term, _ in fitted.nuisance.parts[1:]],
-        [size for _, size in fitted.nuisance.parts[1:]],
-    ).ground(fitted.effects, fitted.free)
-    covariance = fitted.covariance()[: fitted.centre.size, place]
-    step = TUNING.numerics.reach * covariance / np.sqrt(covariance[place])
-    for way in (step, -step):
-        moved = ground.bounds.clipped(fitted.centre + way) - fitted.centre
-        foretold = fitted.gradient @ moved + 0.5 * moved @ fitted.curvature @ moved
-        lost = ground.tried(fitted.centre + moved)[1] - fitted.nats
-        if not abs(lost - foretold) < 0.5 * _lost():
-            return False
-    return True
+    terms, sizes = zip(*fitted.nuisance.parts, strict=True)
+    ground = problem.with_terms(terms[1:], sizes[1:]).ground(fitted.effects, fitted.free)
+    covariance, centre = fitted.covariance(), fitted.centre
+    for number in numbers:
+        along = covariance[: centre.size, fitted.u.size + number]
+        step = TUNING.numerics.reach * along / np.sqrt(along[fitted.u.size + number])
+        for way in (step, -step):
+            moved = ground.bounds.clipped(centre + way) - centre
+            foretold = fitted.gradient @ moved + 0.5 * moved @ fitted.curvature @ moved
+            lost = ground.tried(centre + moved)[1] - fitted.nats
+            if not abs(lost - foretold) < 0.5 * _lost():
+                yield number
+                break
 
 
 def _profile(search: EffectSearch, model: Model, number: int, step: float) -> Iterator[Array]:

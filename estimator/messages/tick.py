@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 # compares like with like. 2: changes of the soil, estimates that are not believed.
 # 5: the record is judged and linearised anew in the ticks after a window; sums in a stated order,
 # whatever the processor (3 and 4 were steps to it).
-REVISION = 10
+REVISION = 11
 
 Field = tuple[str, str, str]  # (name, ROS type, meaning with unit)
 TickRow = tuple[float, ...]  # the values of a Tick, in the order of TICK_FIELDS

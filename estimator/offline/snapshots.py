@@ -60,7 +60,7 @@ def snapshots(
     required = [wheel.known, carriage.known, *sought]
 
     columns: tuple[NDArray[Any] | Series, ...] = (
-        view.ends - view.length // 2,
+        view.centres,
         np.logical_and.reduce(required),
         wheel.position,
         wheel,
@@ -168,6 +168,7 @@ class View:
         self._closed = recorded.ticks - round(settings.rates.horizon * NS)
         self.length = length
         self.ends = self._closed[chosen]
+        self.centres = self.ends - length // 2
         nan, zero = np.full(len(chosen), np.nan), np.zeros(len(chosen))
         self.nothing = EncoderSeries(nan, zero, zero > 0, np.zeros(len(chosen), np.int64), nan)
 
@@ -252,12 +253,12 @@ class View:
 
         accepted = self._rebaselined(accepted, channel.max_rate)
         stamp, counts, members = accepted
-        line = lines(members, stamp, counts)
+        line = lines(members, stamp, counts, self.centres)
         span = stamp[members.last] - stamp[members.first]
         known = (members.size >= 3) & (span >= self.length // 2)
 
         scale = channel.calibration.scale.value * arm
-        position = line.mean * scale + channel.calibration.offset.value * arm
+        position = line.middle * scale + channel.calibration.offset.value * arm
         sigma = _slope_sigma(channel.noise, members.size, line)
         return EncoderSeries(
             np.where(known, line.rate * scale, np.nan),

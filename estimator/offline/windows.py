@@ -79,28 +79,32 @@ class WindowLines(NamedTuple):
     readings.
     """
 
-    mean: Array  # (m,) [raw]
+    middle: Array  # (m,) [raw] at the centre of each window
     rate: Array  # (m,) [raw/s]
     spread: Array  # (m,) √Σ(t − t̄)² [s]
     moved: Array  # (m,) counts from the first reading to the last [raw]
 
 
-def lines(members: Members, stamp: Ints, counts: Ints) -> WindowLines:
-    """Lines through the counts (n,) at the stamps (n,) [ns]; see wheel.windows.SlopeWindow."""
+def lines(members: Members, stamp: Ints, counts: Ints, centres: Ints) -> WindowLines:
+    """Lines through the counts (n,) at the stamps (n,) [ns] in windows about `centres` (m,) [ns];
+    see wheel.windows.SlopeWindow.
+    """
     reading, window = members.reading, members.window
-    origin = counts[members.first]
+    origin, begun = counts[members.first], stamp[members.first]
     size = np.maximum(members.size, 1)
-    t = (stamp[reading] - stamp[members.first][window]).astype(float)
+    t = (stamp[reading] - begun[window]).astype(float)
     x = (counts[reading] - origin[window]).astype(float)
 
     mean = members.sum(x) / size
-    t -= (members.sum(t) / size)[window]
+    at = members.sum(t) / size
+    t -= at[window]
     spread = members.sum(t * t)
     with np.errstate(divide="ignore", invalid="ignore"):  # a window of one reading has no slope
         rate = members.sum(t * (x - mean[window])) / spread * NS
 
     moved = np.abs(counts[members.last] - origin).astype(float)
-    return WindowLines(origin + mean, rate, np.sqrt(spread) / NS, moved)
+    middle = origin + mean + rate * ((centres - begun) - at) / NS
+    return WindowLines(middle, rate, np.sqrt(spread) / NS, moved)
 
 
 # ---- blocks side by side -------------------------------------------------------------------------

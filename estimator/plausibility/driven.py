@@ -209,7 +209,7 @@ def _speed(
         return none, none
     stamps, counts = raw[name]
     inside = members(stamps, after, until)
-    line = lines(inside, stamps, counts)
+    line = lines(inside, stamps, counts, (after + until) // 2)
     span = stamps[inside.last] - stamps[inside.first]
     known = (inside.size >= 3) & (span >= (until - after) // 2)
 

@@ -232,7 +232,7 @@ class Sync:
             return float("nan"), NOTHING
         calibration = self.settings.channels[name].calibration
         scale = calibration.scale.value * arm
-        position = slope.mean * scale + calibration.offset.value * arm
+        position = slope.middle * scale + calibration.offset.value * arm
         return position, Measured(slope.rate * scale, slope.rate_sigma * abs(scale))
 
     def _analogue(self, name: str, mean: Mean | None) -> Measured:

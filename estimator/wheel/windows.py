@@ -38,9 +38,11 @@ class Counters:
 
 
 class Slope(NamedTuple):
-    """A count over the window: mean [raw], rate [raw/s] and their standard deviations."""
+    """The line through a count over the window: its value [raw] at the centre, rate [raw/s] and σ
+    of that.
+    """
 
-    mean: float
+    middle: float
     rate: float
     rate_sigma: float
 
@@ -146,7 +148,7 @@ class MeanWindow(ChannelWindow):
 
 @dataclass
 class SlopeWindow(ChannelWindow):
-    """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
+    """The least-squares line through an encoder count over the window, by exact integer sums.
 
     max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken
     out by a shift of the baseline, so neither position nor speed shows it. That bridges one jump:
@@ -218,4 +220,10 @@ class SlopeWindow(ChannelWindow):
         rate = (count * stx - st * sx) / spread * NS
         moved = abs(self.inside[-1].value - self.inside[0].value)
         sigma = slope_sigma(self.noise, sqrt(spread / count) / NS, count, moved)
-        return Slope(self.origin[1] + sx / count, rate, sigma)
+        return Slope(self.origin[1] + sx / count + rate * self._off_centre(), rate, sigma)
+
+    def _off_centre(self) -> float:
+        """[s] from the mean stamp of the readings to the centre of the window."""
+        count = len(self.inside)
+        centre = self.closed - self.length // 2 - self.origin[0]
+        return (count * centre - self.sums[0]) / (count * NS)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.wheel.sync import Sync
+from gritd.estimator.wheel.windows import Counters, SlopeWindow
 from tests.rig import SETTINGS, readings_of
 
 MS = 1_000_000
@@ -51,6 +52,26 @@ def test_all_channels_describe_the_centre_of_the_window():
     for snapshot in found[60:]:
         elapsed = (snapshot.evaluated - START) / NS
         assert snapshot.wheel_angle == pytest.approx(0.4 * elapsed, abs=3e-4)
+
+
+@settings(max_examples=20)
+@given(st.floats(5e-5, 5e-4), st.floats(0.0, 4.0))
+def test_an_encoder_whose_clock_drifts_does_not_leap_in_position(drift, phase):
+    """Readings of another clock come to lie in the next window; the way between two windows is
+    that which was driven, to a tenth of the way between two readings.
+    """
+    speed, between = 1e5, 4 * MS  # [counts/s], [ns]
+    window = SlopeWindow(0.3, 0, 100 * MS)
+    places = []
+    for k in range(8000):
+        stamp = START + round((k * (1.0 + drift) + phase / 4.0) * between)
+        window.insert(stamp, round(speed * (stamp - START) / NS), Counters())
+        end = START + k * between
+        window.advance(end)
+        if k > 50 and k % 25 == 0:
+            line = window.slope()
+            places.append(line.middle - speed * (end - 50 * MS - START) / NS)
+    assert max(map(abs, places)) < 0.1 * speed * between / NS
 
 
 def test_not_ready_before_a_window_has_filled():

@@ -19,7 +19,7 @@ and is joined to its neighbour of the same condition as it ages.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp
+from math import exp, sqrt
 from typing import Any, NamedTuple
 
 from gritd.estimator.filter.bank import Bank
@@ -31,7 +31,7 @@ from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.wheel.chain import Added, Here
 from gritd.estimator.wheel.geometry import EntryAngle, entry_angle
 from gritd.estimator.wheel.sync import Measured
-from gritd.estimator.wheel.wheel_state import WheelState, slip_over
+from gritd.estimator.wheel.wheel_state import SCATTER, WheelState, slip_over
 
 CAPACITY = 36  # stretches that are linearised anew
 SHORTEST = 5  # windows merged into one stretch while it is recent …
@@ -64,13 +64,19 @@ class Stretch(NamedTuple):
         return self.windows >= STEADY
 
     def like(self, other: Stretch) -> bool:
-        """Whether another is of the same condition."""
+        """Whether another is of the same condition, as far as the noise of both lets that be
+        seen.
+        """
         mean, now = self.mean, other.mean
+        noise = SCATTER * sqrt(1.0 / self.windows + 1.0 / other.windows)
+        depths = now.theta_1.d_sinkage * now.sinkage.sigma
         return (
             other.components == self.components
-            and abs(now.slip.value - mean.slip.value) <= SAME_SLIP
-            and abs(now.load.value - mean.load.value) <= SAME_LOAD * mean.load.value
-            and abs(now.theta_1.value - mean.theta_1.value) <= SAME_ANGLE * mean.theta_1.value
+            and abs(now.slip.value - mean.slip.value) <= SAME_SLIP + noise * now.slip.sigma
+            and abs(now.load.value - mean.load.value)
+            <= SAME_LOAD * mean.load.value + noise * now.load.sigma
+            and abs(now.theta_1.value - mean.theta_1.value)
+            <= SAME_ANGLE * mean.theta_1.value + noise * depths
         )
 
     def merged(self, after: Stretch, radius: float) -> Stretch:

@@ -1,10 +1,10 @@
 """Steady-state tables as recordings: every condition a segment of constant speed, a short silence
 between segments.
 
-A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of
-a normal distribution, a tenth of a second each, in an order that differs by channel: the segment
-has mean and deviation exactly, and its mean is as uncertain as that of INDEPENDENT readings. Did
-they change faster, all scatter would average out, and a comparison would take the mean for exact.
+A table gives a mean and a standard deviation. Within a segment the means over a tenth of a second
+take the quantiles of a normal distribution, in an order that differs by channel: they have mean and
+deviation exactly, and the segment's mean is as uncertain as that of INDEPENDENT values. The
+readings about these means are as white noise is, so √10 times as uncertain each (`reading_sigma`).
 The order is the same in every segment and recording, so equal states read the same in all.
 """
 
@@ -27,16 +27,19 @@ START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]
 DURATION = 6.0  # [s] of a segment
 PAUSE = 1.0  # [s] between segments
-INDEPENDENT = 60  # tenths of a second in a segment
+TENTH = RATE // 10  # readings in a tenth of a second
+INDEPENDENT = round(RATE * DURATION) // TENTH  # tenths of a second in a segment
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One row of a table, SI. A pull, a torque, a lateral force that was not measured is None."""
+    """One row of a table, SI, with standard deviations of means over a tenth of a second. A pull, a
+    torque, a lateral force that was not measured is None.
+    """
 
     rim_speed: float  # rω [m/s]
     carriage_speed: float  # v [m/s]
-    sinkage: Uncertain  # z [m], mean ± standard deviation of the readings
+    sinkage: Uncertain  # z [m]
     load: Uncertain  # W [N]
     drawbar_pull: Uncertain | None = None  # [N]
     lateral_force: Uncertain | None = None  # [N]
@@ -64,10 +67,17 @@ def check_few(path: Path, conditions: int) -> None:
 
 
 def scatter_of_mean(value: float, sigma: float) -> Uncertain:
-    """A tabulated value whose own standard deviation is sigma, as readings whose mean is as
-    uncertain.
+    """A tabulated value whose own standard deviation is sigma, as tenths of a second whose mean is
+    as uncertain.
     """
     return Uncertain(value, sigma * INDEPENDENT**0.5)
+
+
+def reading_sigma(sigma: float) -> float:
+    """Standard deviation of a reading, from that of the tabulated value: the `noise` of a
+    channel.
+    """
+    return float(sigma * np.sqrt(INDEPENDENT * TENTH))
 
 
 def streams(conditions: Sequence[Condition], counting: Counting) -> list[ChannelReadings]:
@@ -120,8 +130,15 @@ def _all(values: Sequence[Uncertain | None], channel: int) -> Array:
     """One array of mean ± standard deviation, segment by segment; 0 where nothing was measured.
     channel: its number, which orders the scatter.
     """
-    scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
-    order = np.random.default_rng(channel).permutation(scores / scores.std())
-    scatter = np.repeat(order, round(RATE * DURATION / INDEPENDENT))
+    rng = np.random.default_rng(channel)
+    means = rng.permutation(_scores(INDEPENDENT))
+    within = rng.permuted(np.tile(_scores(TENTH), (INDEPENDENT, 1)), axis=1)
+    scatter = (means[:, None] + np.sqrt(TENTH - 1.0) * within).ravel()
     known = [value or Uncertain(0.0) for value in values]
     return np.concatenate([v.value + v.sigma * scatter for v in known])
+
+
+def _scores(count: int) -> Array:
+    """Quantiles (count,) of a normal distribution, of mean 0 and standard deviation 1."""
+    scores = norm.ppf((np.arange(count) + 0.5) / count)
+    return np.asarray(scores / scores.std())

@@ -29,7 +29,14 @@ from gritd.tools.importers.files import (
 )
 from gritd.tools.importers.recording import configuration, write
 from gritd.tools.importers.registry import Tell
-from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
+from gritd.tools.importers.segments import (
+    Condition,
+    Counting,
+    check_few,
+    reading_sigma,
+    scatter_of_mean,
+    streams,
+)
 
 NAME = "table"
 SUMMARY = (
@@ -57,6 +64,9 @@ SOIL = (
     "cohesion_kPa",
     "friction_angle_deg",
 )
+# [rad/s] of the wheel where none is stated: in a second it rolls its contact over, and what it
+# reads from then on is that of steady motion
+TURNING = 0.5
 COUNT = 1e-6  # [m] of rim or carriage travel
 COUNTING = Counting(COUNT, COUNT, pot_scale=1.0, pot_offset=0.0)
 NOT_TAKEN = "not taken from the tables but left to be found: dry sands in general."
@@ -66,9 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed",
         type=number(above=0.0),
-        default=0.01,
         metavar="M/S",
-        help="of the faster of rim and carriage, default 0.01",
+        help="of the faster of rim and carriage; default: half a wheel's radius a second",
     )
 
     for name, (unit, _, least) in MEASURED_ERRORS.items():
@@ -193,6 +202,7 @@ def _conditions(
     path: Path, rows: list[int], table: Table, args: argparse.Namespace
 ) -> list[Condition]:
     columns = [numbers(path, table, name, rows).tolist() for name in MEASURED]
+    speed = args.speed or TURNING * _radius(path, table)
     has = TORQUE in table
     torques = numbers(path, table, TORQUE, rows).tolist() if has else [None] * len(rows)
     sigma, conditions = errors(table, args), []
@@ -205,8 +215,8 @@ def _conditions(
 
         conditions.append(
             Condition(
-                rim_speed=args.speed * min(1.0, 1.0 + slip),
-                carriage_speed=args.speed * min(1.0, 1.0 - slip),
+                rim_speed=speed * min(1.0, 1.0 + slip),
+                carriage_speed=speed * min(1.0, 1.0 - slip),
                 sinkage=scatter_of_mean(sinkage, sigma["sinkage"]),
                 load=scatter_of_mean(load, sigma["load"]),
                 drawbar_pull=scatter_of_mean(pull, sigma["drawbar-pull"]),
@@ -268,10 +278,8 @@ def _values(
     """What the configuration's template asks for."""
     constant = {name: _constant(path, table, name) for name in CONSTANTS}
     soil = _soil(path, soils, constant["soil_simulant"])
-    radius = finite_number(path, "wheel_radius_m", constant["wheel_radius_m"])
+    radius = _radius(path, table)
     shear = finite_number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
-    if radius <= 0.0:
-        raise RigFileError(f"{path}: wheel_radius_m: found {radius:g}; expected more than 0 m")
     sigma = errors(table, args)
 
     values: dict[str, float] = {
@@ -288,13 +296,25 @@ def _values(
         "sinkage_sigma": sigma["sinkage"],
         "torque_sigma": sigma["torque"],
         "drawbar_pull_sigma": sigma["drawbar-pull"],
+        "sinkage_noise": reading_sigma(sigma["sinkage"]),
+        "torque_noise": reading_sigma(sigma["torque"]),
+        "force_noise": reading_sigma(max(sigma["drawbar-pull"], sigma["load"])),
     }
 
     strength, comment = _strength(soil, args.soil_strength)
     return {name: f"{value:.9f}" for name, value in (values | strength).items()} | {
         "source": constant["source"],
         "strength": comment,
+        "torque_source": "motor_shunt" if TORQUE in table else "none",
     }
+
+
+def _radius(path: Path, table: Table) -> float:
+    """[m] of the wheel. Raises RigFileError."""
+    radius = finite_number(path, "wheel_radius_m", _constant(path, table, "wheel_radius_m"))
+    if radius <= 0.0:
+        raise RigFileError(f"{path}: wheel_radius_m: found {radius:g}; expected more than 0 m")
+    return radius
 
 
 def _strength(soil: dict[str, float], source: str) -> tuple[dict[str, float], str]:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import csv
+import json
+from dataclasses import replace
+from math import cos
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gritd.estimator.config import configuration as config
+from gritd.estimator.terramechanics.soil import PressureSinkage
+from gritd.tools.commands import estimate
 from gritd.tools.commands.import_rig import main
 from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
@@ -17,7 +22,9 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
 from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.rigs.table import load_scatter, repeat_scatter
+from tests.linear_plant import entry_angle
 from tests.real_recordings import REAL, Physical, needs
+from tests.rig import SETTINGS
 
 
 @needs("ding")
@@ -118,6 +125,38 @@ def test_a_wheel_with_other_lugs_is_another_wheel_and_may_have_no_torque(
     assert trials[1].value("motor_shunt").mean() == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("torque", [True, False])
+def test_the_filter_finds_the_soil_of_a_table(tmp_path: Path, torque: bool) -> None:
+    """Steady states of a wheel that obeys the equations, with the torque or the pull alone."""
+    cohesion, tan_phi, k = 900.0, 0.65, 0.02
+    rig = replace(
+        SETTINGS,
+        wheel=replace(SETTINGS.wheel, radius=0.1, width=0.1),
+        soil=replace(SETTINGS.soil, pressure_sinkage=PressureSinkage("bekker", 1.1, 900.0, 1500e3)),
+    )
+    rows = []
+    for load in (40.0, 70.0, 100.0):
+        for slip in (0.1, 0.2, 0.3, 0.45, 0.6):
+            theta_1, forces = entry_angle(rig, (cohesion, tan_phi, k), load, slip)
+            told = (load, slip, forces.drawbar_pull, 0.1 * (1.0 - cos(theta_1)), forces.torque)
+            rows.append("me,0.1,0.1,sand,0.02," + ",".join(f"{value:.5f}" for value in told))
+    if not torque:
+        rows = [row.rpartition(",")[0] for row in rows]
+    header = f"{HEADER},meas_torque_nm" if torque else HEADER
+    (tmp_path / "one.csv").write_text("\n".join([header, *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+
+    told = tmp_path / "soil.json"
+    assert estimate.main([str(tmp_path / "out" / "one.mcap"), "--json", str(told)]) == 0
+    found = json.loads(told.read_text())
+    assert found["believed"]
+    for name, true in (("c", cohesion), ("tan_phi", tan_phi), ("k", k)):
+        known = found["together"][name]
+        assert known["value"] == pytest.approx(true, abs=2.0 * known["sigma"]), name
+    assert found["together"]["tan_phi"]["sigma"] < 0.7 * 0.15  # less than before the run
+
+
 def test_a_torque_that_one_row_lacks_is_told_by_its_row(tmp_path: Path) -> None:
     rows = [*rows_of(0.1, "clay", ",2.0"), *rows_of(0.1, "sand", ",2.0")]
     rows[4] = rows[4].removesuffix("2.0")
@@ -137,7 +176,7 @@ def test_loads_that_were_meant_to_be_one_do_not_differ_by_more_than_their_scatte
     (tmp_path / "soils.csv").write_text(SOILS)
     main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
     load = Physical(tmp_path / "out" / "one.mcap").force("fz").reshape(3, -1)
-    uncertain = load.std(axis=1) / 60**0.5
+    uncertain = load.std(axis=1) / load.shape[1] ** 0.5
     assert uncertain == pytest.approx(0.01, rel=0.05)
     assert np.ptp(load.mean(axis=1)) <= 2.01 * uncertain[0]
 
@@ -160,8 +199,8 @@ def test_repeats_of_a_condition_tell_how_uncertain_a_value_is(
     (tmp_path / "soils.csv").write_text(SOILS)
     assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
     assert "drawbar-pull 3 N, sinkage 0.00025 m, load" in capsys.readouterr().out
-    pull = Physical(tmp_path / "out" / "one.mcap").force("fx").reshape(3, -1)
-    assert pull.std(axis=1) / 60**0.5 == pytest.approx(3.0)
+    pull = Physical(tmp_path / "out" / "one.mcap").force("fx").reshape(3, 60, 10)
+    assert pull.mean(axis=2).std(axis=1) / 60**0.5 == pytest.approx(3.0)
 
 
 def test_a_state_reads_the_same_under_any_name_and_in_any_row(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import begin
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
-from tests.tools.diagnose.unlisted import BentRail, CableChainDrag, NextDoor
+from tests.tools.diagnose.unlisted import BentRail, CableChainDrag, NextDoor, ShearBands
 
 
 def frees_the_soil(found: Diagnosis) -> bool:
@@ -114,6 +114,14 @@ def test_a_friction_is_named_beside_a_larger_stranger_elsewhere(
     assert "coulomb_friction" in group(found), found.summary
     assert len([h for h in found.hypotheses if h.accepted]) == 1
     assert found.remaining_words
+
+
+def test_a_wave_along_the_way_that_the_rim_slides_is_no_noise() -> None:
+    found = diagnosed(plan(), (ShearBands(size=1.5),))
+    assert found.verdict == "unlisted", found.summary
+    first = found.location[0]
+    assert (first.channel, first.covariate) == ("drawbar_pull", "sliding")
+    assert "15" in first.where
 
 
 def test_no_force_sensor_degrades_honestly() -> None:

@@ -57,6 +57,21 @@ class NextDoor(Effect):
 
 
 @dataclass(frozen=True)
+class ShearBands(Effect):
+    """Soil fails in bands: the pull swells and falls each time the rim has slid by 15 mm."""
+
+    size: float = _size(0.5)
+    stage = "testbed"
+    fingerprint = Fingerprint("drawbar_pull", "slip", "")
+
+    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+        speed = np.abs(situation.radius * situation.wheel_speed - situation.carriage_speed)
+        slid = np.cumsum(speed * np.gradient(situation.time))
+        bands = self.size * np.sin(2.0 * np.pi * slid / 0.015)
+        return replace(reaction, drawbar_pull=reaction.drawbar_pull + bands)
+
+
+@dataclass(frozen=True)
 class RailJointDrag(Effect):
     """Beyond a joint of the rails the carriage drags."""
 

@@ -41,6 +41,7 @@ AT = {  # a value of a covariate, in words
 }
 PLACES = ("time", "position")
 TIMES = {1: "once", 2: "twice"}
+SLIDING = "of sliding over the soil"
 OSCILLATES = "oscillates with a period of"
 
 
@@ -62,7 +63,7 @@ def described(shape: Shape, units: Mapping[str, str]) -> str:
         return f"an offset of {spelled(shape.channel)}"
     if shape.along == ("run",):
         return f"a change in {spelled(shape.channel)} from run to run"
-    ways = {"time": "over time", "position": _along(units)}
+    ways = {"time": "over time", "position": _along(units), "sliding": SLIDING}
     where = " and ".join(ways.get(name, f"with {spelled(name)}") for name in shape.along)
     kind = "smooth change" if shape.kind == "smooth" else shape.kind
     return f"a {kind} in {spelled(shape.channel)} {where}"
@@ -145,7 +146,8 @@ def _oscillates(stack: Stack, shape: Shape, size: float) -> str:
     length = spaced(factor / at, unit, 3)
     if axis == "time":
         return f"{OSCILLATES} {length}, {amplitude}"
-    return f"waves of {length} {_along(stack.rig.units)}, {amplitude}"
+    along = SLIDING if axis == "sliding" else _along(stack.rig.units)
+    return f"waves of {length} {along}, {amplitude}"
 
 
 class _Where:

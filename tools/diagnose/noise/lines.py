@@ -1,9 +1,12 @@
-"""Waves in time and along the bed: where they are looked for, and those that are no noise.
+"""Waves in time, along the bed and along the way that the rim slides: where they are looked for,
+and those that are no noise.
 
 A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any
 length, and what shakes a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its
 period, not its phase. A wave of the bed or of the rails stays where it is: one phase for all runs,
-or, where the bed was made anew, one for each. Whether a line stands out of the noise's spectrum is
+or, where the bed was made anew, one for each. Soil that fails in bands swells and falls each time
+the rim has slid by their distance: a wave along the way that it has slid, with a phase of its own
+in every stretch. Whether a line stands out of the noise's spectrum is
 decided as at the recordings' own rate (orders/lines.py).
 """
 
@@ -23,7 +26,7 @@ from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
-AXES = ("time", "position")
+AXES = ("time", "position", "sliding")
 
 
 def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Index) -> Array:
@@ -54,6 +57,11 @@ def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Ind
     return np.column_stack(columns)
 
 
+def axes_of(stack: Stack) -> list[str]:
+    """Along which waves are looked for: a drive has no soil to slide over."""
+    return [axis for axis in AXES if axis in stack.rig.runs[0].covariates]
+
+
 def stretches(stack: Stack, channel: str) -> list[Index]:
     """Places (n,) of a channel's values in one run while the wheel moves, long runs cut into equal
     parts.
@@ -82,7 +90,7 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
         return np.zeros(0)
 
     interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
-    span = longest if axis == "time" else float(np.ptp(x[np.concatenate(parts)]))
+    span = longest if axis in ("time", "sliding") else float(np.ptp(x[np.concatenate(parts)]))
     every = np.arange(TUNING.noise.most_frequencies) / (TUNING.noise.line_density * span)
     tried = TUNING.orders.cycles / longest + every
     return np.asarray(tried[tried * interval < TUNING.orders.nyquist])
@@ -103,7 +111,8 @@ def _phases(stack: Stack, channel: str) -> list[tuple[str, list[Index]]]:
     if not parts:
         return []
     shared = [("position", [np.concatenate(parts)])] if len(parts) > 1 else []
-    return [("time", parts), *shared, ("position", parts)]
+    own = [(axis, parts) for axis in axes_of(stack)]
+    return [*own[:1], *shared, *own[1:]]
 
 
 def _lines(

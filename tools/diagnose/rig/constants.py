@@ -21,7 +21,8 @@ LEAN = "side_force_lean"
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "side_force": "N", "load": "N",
     "sinkage": "m",
-    "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s",
+    "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "sliding": "m",
+    "time": "s",
     "acceleration": "rad/s²", "heat": "A²·s", "run": "-", "direction": "-", "constant": "-",
 }  # fmt: skip
 

@@ -20,7 +20,7 @@ from gritd.tools.diagnose.rig.states import states, turned_back, turning
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import LONG_AGO
 
-COURSE = ("wheel_angle", "position", "time", "acceleration", "heat")
+COURSE = ("wheel_angle", "position", "sliding", "time", "acceleration", "heat")
 HOLDING_NOTE = (
     "The motor holds torque while the wheel stands, so its current at rest tells no offset."
 )
@@ -74,7 +74,8 @@ def _measured_run(data: Recorded, number: int, settings: Settings, sinkage: Arra
 def covariates(
     signals: Signals, motion: Motion, wheel: Wheel, tabled: bool = False
 ) -> dict[str, Array]:
-    """Of one run (n,) each, SI; `rolled` is the angle [rad] that the wheel has turned, either way.
+    """Of one run (n,) each, SI; `rolled` is the angle [rad] that the wheel has turned, either way,
+    `sliding` the way [m] that its rim has slid over the soil.
 
     tabled: a table of steady states has no course of time, place and wheel angle: these are 0, so
         that the order of scatter that an importer drew is never taken for a trend or a ripple. A
@@ -84,6 +85,7 @@ def covariates(
     current = filled(signals.analogue.get("current", np.zeros(signals.time.size)))
     step = float(np.median(np.diff(signals.time)))
     ones = np.ones(signals.time.size)
+    slid = np.abs(wheel.radius * np.asarray(motion.wheel_speed) - np.asarray(motion.carriage_speed))
 
     known = {
         "slip": np.asarray(situation.slip),
@@ -92,6 +94,7 @@ def covariates(
         "wheel_angle": angle,
         "rolled": np.cumsum(np.abs(np.diff(angle, prepend=angle[0]))),
         "position": np.asarray(situation.position),
+        "sliding": np.cumsum(slid) * step,
         "time": np.asarray(motion.time),
         "acceleration": np.asarray(situation.wheel_acceleration),
         "heat": np.cumsum(current**2) * step,

@@ -60,12 +60,12 @@ class Family:
 
     @property
     def phases(self) -> tuple[bool, ...]:
-        """Whether all blocks have one coefficient: of waves in time never, of waves along the bed
-        it is not known.
+        """Whether all blocks have one coefficient: of waves along the bed it is not known, of
+        others never.
         """
         if len(self.blocks) == 1 or self.axis == "wheel_angle":
             return (True,)
-        return (False,) if self.axis == "time" else (False, True)
+        return (False, True) if self.axis == "position" else (False,)
 
     def evidence(self, beside: Projection, near: Array | None = None) -> Array:
         """Log Bayes factor (p, f) of every shape, p phases, beside a model; with neighbours, by
@@ -126,10 +126,11 @@ def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[F
     searched = []
 
     for channel in stack.rig.channels:
-        for axis in lines.AXES:
+        for axis in lines.axes_of(stack):
             every = lines.frequencies(stack, channel, axis)
             searched.append(waves(stack, noise, channel, axis, every, acting))
-            searched.append(steps(stack, noise, channel, axis, acting))
+            if axis != "sliding":
+                searched.append(steps(stack, noise, channel, axis, acting))
 
     return tuple(family for family in searched if family.blocks)
 

@@ -39,7 +39,7 @@ def stack() -> Any:
     run = np.repeat(np.arange(RUNS), LENGTH)
     own = np.tile(np.arange(LENGTH) * STEP, RUNS)
     known = {"speed": np.full(run.size, 0.02), "time": own + 61.7 * run, "position": 0.02 * own}
-    rig = SimpleNamespace(channels=("pull",), runs=[None] * RUNS)
+    rig = SimpleNamespace(channels=("pull",), runs=[SimpleNamespace(covariates=known)] * RUNS)
     return SimpleNamespace(
         rig=rig,
         run=run,

@@ -80,15 +80,16 @@ class Stretch(NamedTuple):
         )
 
     def merged(self, after: Stretch, radius: float) -> Stretch:
-        """This stretch and the next, or one more window. Sigmas stay those of a single window; that
-        of slip is what it would be if the windows were independent.
+        """This stretch and the next, or one more window. Sigmas are those of a single window, in
+        the mean square; that of slip is what it would be if the windows were independent.
         """
         windows = self.windows + after.windows
         weight = after.windows / windows
         old, now = self.mean, after.mean
 
         def mean(a: Measured, b: Measured) -> Measured:
-            return Measured(a.value + (b.value - a.value) * weight, a.sigma)
+            square = a.sigma * a.sigma + (b.sigma * b.sigma - a.sigma * a.sigma) * weight
+            return Measured(a.value + (b.value - a.value) * weight, sqrt(square))
 
         sinkage = mean(old.sinkage, now.sinkage)
         angle: EntryAngle = entry_angle(radius, sinkage.value)

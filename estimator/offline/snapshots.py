@@ -24,7 +24,7 @@ from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.offline.windows import Bools, Ints, Members, WindowLines, lines, members
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot, window_at_first
-from gritd.estimator.wheel.windows import DITHER, ENOUGH, Sample
+from gritd.estimator.wheel.windows import DITHER, ENOUGH, STEP, Sample
 
 
 def encoder_samples(
@@ -222,10 +222,11 @@ class View:
 
         size = accepted.members.size
         mean = accepted.members.mean(accepted.values)
+        heard = accepted.members.heard(STEP * accepted.members.step(accepted.values), noise)
         scale = calibration.scale.value
         return Series(
             np.where(size > 0, mean * scale + calibration.offset.value, np.nan),
-            np.where(size > 0, noise / np.sqrt(np.maximum(size, 1)) * abs(scale), 0.0),
+            np.where(size > 0, heard / np.sqrt(np.maximum(size, 1)) * abs(scale), 0.0),
             size > 0,
             accepted.nearly_still(self.ends, lambda stamp: self._near(stamp, noise)),
         )
@@ -259,7 +260,7 @@ class View:
 
         scale = channel.calibration.scale.value * arm
         position = line.middle * scale + channel.calibration.offset.value * arm
-        sigma = _slope_sigma(channel.noise, members.size, line)
+        sigma = _slope_sigma(members.heard(line.left, channel.noise), members.size, line)
         return EncoderSeries(
             np.where(known, line.rate * scale, np.nan),
             np.where(known, sigma * abs(scale), 0.0),
@@ -374,7 +375,7 @@ class View:
         return np.asarray(np.any([axis.known for axis in axes], axis=0) & ~np.any(live, axis=0))
 
 
-def _slope_sigma(noise: float, size: Ints, line: WindowLines) -> Array:
+def _slope_sigma(noise: Array, size: Ints, line: WindowLines) -> Array:
     """Standard deviation of each window's rate (m,) [raw/s]; see geometry.slope_sigma."""
     count = np.maximum(size, 1)
     independent = np.minimum(count, (line.moved + 1.0) ** 2)

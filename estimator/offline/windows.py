@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.terramechanics.soil import Array
+from gritd.estimator.wheel.windows import LOUDER, SCATTERED
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -51,6 +52,26 @@ class Members(NamedTuple):
         mean: Array = self.sum(values[self.reading]) / np.maximum(self.size, 1)
         return mean
 
+    def step(self, values: Array) -> Array:
+        """Median (m,) of the steps between the readings' values (n,); 0 without any."""
+        inside = values[self.reading]
+        within = np.diff(self.window, prepend=-1) == 0
+        steps = np.abs(np.diff(inside, prepend=0.0))[within]
+        ordered = steps[np.lexsort((steps, self.window[within]))]
+        ends = np.cumsum(np.maximum(self.size - 1, 0))
+        count = np.diff(ends, prepend=0)
+        middle = ends - count + count // 2, ends - 1 - count // 2
+        ordered = np.append(ordered, 0.0)  # windows without a step
+        low, high = (ordered[np.clip(at, 0, len(steps))] for at in middle)
+        return np.where(count > 0, 0.5 * (low + high), 0.0)
+
+    def heard(self, scatter: Array, stated: float) -> Array:
+        """σ of one reading in each window (m,), by what they scatter by (m,); see
+        wheel.windows.heard.
+        """
+        least = stated * (1.0 + LOUDER / np.sqrt(np.maximum(self.size, 1)))
+        return np.where((self.size >= SCATTERED) & (scatter > least), scatter, stated)
+
     def hold_two(self, values: NDArray[Any]) -> Bools:
         """Whether each window (m,) holds one or two different values of the readings' (n,)."""
         inside = values[self.reading]
@@ -83,6 +104,7 @@ class WindowLines(NamedTuple):
     rate: Array  # (m,) [raw/s]
     spread: Array  # (m,) √Σ(t − t̄)² [s]
     moved: Array  # (m,) counts from the first reading to the last [raw]
+    left: Array  # (m,) what the readings scatter by about the line [raw]
 
 
 def lines(members: Members, stamp: Ints, counts: Ints, centres: Ints) -> WindowLines:
@@ -100,11 +122,14 @@ def lines(members: Members, stamp: Ints, counts: Ints, centres: Ints) -> WindowL
     t -= at[window]
     spread = members.sum(t * t)
     with np.errstate(divide="ignore", invalid="ignore"):  # a window of one reading has no slope
-        rate = members.sum(t * (x - mean[window])) / spread * NS
+        along = members.sum(t * (x - mean[window]))
+        rate = along / spread * NS
+        squares = members.sum((x - mean[window]) ** 2) - along * along / spread
 
     moved = np.abs(counts[members.last] - origin).astype(float)
     middle = origin + mean + rate * ((centres - begun) - at) / NS
-    return WindowLines(middle, rate, np.sqrt(spread) / NS, moved)
+    left = np.sqrt(np.maximum(squares, 0.0) / np.maximum(size - 2, 1))
+    return WindowLines(middle, rate, np.sqrt(spread) / NS, moved, left)
 
 
 # ---- blocks side by side -------------------------------------------------------------------------

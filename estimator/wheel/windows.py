@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections import deque
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import inf, sqrt
 from typing import NamedTuple
 
@@ -18,6 +19,9 @@ from gritd.estimator.wheel.geometry import slope_sigma
 
 DITHER = 0.75  # [σ of one reading] between the two values of a sensor that stands still
 ENOUGH = 8  # readings in a window without which a dither is not distinguished from noise
+SCATTERED = 4  # readings in a window that tell how much they scatter
+STEP = 1.0484  # σ of normal readings over the median of their steps
+LOUDER = 5.0  # over √n: a thousandth of windows of n readings scatter so much more than they do
 
 
 class Sample(NamedTuple):
@@ -121,8 +125,17 @@ class ChannelWindow:
         return bool(self.inside) and self.closed - self.still_since >= span
 
 
+def heard(scatter: float, count: int, stated: float) -> float:
+    """σ of one reading of so many: the stated one, or what they scatter by where chance hardly
+    explains it.
+    """
+    enough = count >= SCATTERED and scatter > stated * (1.0 + LOUDER / sqrt(count))
+    return scatter if enough else stated
+
+
 class MeanWindow(ChannelWindow):
-    """Mean of an analogue channel over the window.
+    """Mean of an analogue channel over the window. Its noise is the stated one, or what the
+    readings show where that is more than the stated one explains.
 
     A sensor that stands still may dither between two values of its converter. It is distinguished
     from a live one by their distance, less than its noise, and by there being no third.
@@ -139,11 +152,19 @@ class MeanWindow(ChannelWindow):
         return values == {self.last} or (len(values) <= 2 and len(self.inside) >= ENOUGH)
 
     def mean(self) -> Mean | None:
-        inside = self.inside
-        if not inside:
+        values = [sample.value for sample in self.inside]
+        if not values:
             return None
-        count = len(inside)
-        return Mean(total([sample.value for sample in inside]) / count, self.noise / sqrt(count))
+        count = len(values)
+        noise = heard(STEP * self._step(values), count, self.noise)
+        return Mean(total(values) / count, noise / sqrt(count))
+
+    @staticmethod
+    def _step(values: list[float]) -> float:
+        """Median of the steps from one reading to the next, which a spike leaves as it is."""
+        steps = sorted([abs(b - a) for a, b in pairwise(values)])
+        at = len(steps) // 2
+        return 0.5 * (steps[at] + steps[~at]) if steps else 0.0
 
 
 @dataclass
@@ -161,7 +182,7 @@ class SlopeWindow(ChannelWindow):
     # stamp and count the sums are taken about, which keeps the integers short. The stamp is that of
     # the last jump, or of the reading that came into an empty window.
     origin: tuple[int, int] = (0, 0)
-    sums: tuple[int, int, int, int] = (0, 0, 0, 0)  # Σt, Σx, Σt², Σtx
+    sums: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)  # Σt, Σx, Σt², Σtx, Σx²
 
     def _enter(self, sample: Sample) -> None:
         value = int(sample.value) + self.shift
@@ -176,7 +197,7 @@ class SlopeWindow(ChannelWindow):
                 self._jumped(sample.stamp)
         if not self.inside:
             self.origin = (sample.stamp, value)
-            self.sums = (0, 0, 0, 0)
+            self.sums = (0, 0, 0, 0, 0)
 
         super()._enter(Sample(sample.stamp, value))
         self._add(sample.stamp, value, 1)
@@ -188,13 +209,14 @@ class SlopeWindow(ChannelWindow):
             return
 
         count, later = len(self.inside), stamp - self.origin[0]
-        st, sx, stt, stx = self.sums
+        st, sx, stt, stx, sxx = self.sums
         self.origin = (stamp, self.origin[1])
         self.sums = (
             st - count * later,
             sx,
             stt - later * (2 * st - count * later),
             stx - later * sx,
+            sxx,
         )
 
     def _expected_step(self, elapsed: int) -> int:
@@ -207,19 +229,28 @@ class SlopeWindow(ChannelWindow):
 
     def _add(self, stamp: int, value: int, sign: int) -> None:
         t, x = stamp - self.origin[0], value - self.origin[1]
-        st, sx, stt, stx = self.sums
-        self.sums = (st + sign * t, sx + sign * x, stt + sign * t * t, stx + sign * t * x)
+        st, sx, stt, stx, sxx = self.sums
+        self.sums = (
+            st + sign * t,
+            sx + sign * x,
+            stt + sign * t * t,
+            stx + sign * t * x,
+            sxx + sign * x * x,
+        )
 
     def slope(self) -> Slope | None:
         """None until the readings span half the window: a slope over less is not the window's."""
         count = len(self.inside)
         if count < 3 or self.inside[-1].stamp - self.inside[0].stamp < self.length // 2:
             return None
-        st, sx, stt, stx = self.sums
+        st, sx, stt, stx, sxx = self.sums
         spread = count * stt - st * st  # count · Σ(t − t̄)² [ns²], exact
-        rate = (count * stx - st * sx) / spread * NS
+        along = count * stx - st * sx
+        rate = along / spread * NS
         moved = abs(self.inside[-1].value - self.inside[0].value)
-        sigma = slope_sigma(self.noise, sqrt(spread / count) / NS, count, moved)
+        left = ((count * sxx - sx * sx) * spread - along * along) / (spread * count)
+        noise = heard(sqrt(left / (count - 2)), count, self.noise)
+        sigma = slope_sigma(noise, sqrt(spread / count) / NS, count, moved)
         return Slope(self.origin[1] + sx / count + rate * self._off_centre(), rate, sigma)
 
     def _off_centre(self) -> float:

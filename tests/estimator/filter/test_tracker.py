@@ -77,6 +77,19 @@ def test_one_slip_leaves_c_tan_phi_and_k_inside_2_sigma(slip):
     assert np.all(np.abs(e) < 2 * np.sqrt(np.diag(P)))
 
 
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_sensors_louder_than_stated_leave_the_soil_inside_2_sigma(share):
+    """The noise of a sensor is what a bench's configuration knows least well."""
+    channels = {name: replace(c, noise=share * c.noise) for name, c in RIG.channels.items()}
+    assert RIG.wrench is not None
+    wrench = replace(RIG.wrench, force_noise=share * RIG.wrench.force_noise)
+    stated = replace(RIG, channels=channels, wrench=wrench)
+    track, ticks = run(stated, TRUTH, THREE_LOADS, seed=5)
+    off, covariance = error(track, TRUTH)
+    assert ticks[-1]["resets"] == 0 and not int(ticks[-1]["flags"]) & Flag.PRIOR
+    assert all(abs(off) < 2.0 * np.sqrt(np.diag(covariance)))
+
+
 def test_one_load_is_said_not_to_separate():
     _, ticks = run(RIG, TRUTH, [(20.0, 70.0, 0.3)])
     assert ticks[-1]["status"] == Status.TRACKING

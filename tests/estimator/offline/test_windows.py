@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.offline.windows import block_bend, block_mean, block_slope, lines, members
+from gritd.estimator.wheel.windows import STEP, Counters, MeanWindow
 
 EDGES = np.arange(0.0, 5.05, 0.1)
 
@@ -128,6 +129,28 @@ def test_windows_that_overlap_hold_what_lies_between_their_ends(seed: int) -> No
             assert line.rate[window] == pytest.approx(rate, rel=1e-6, abs=1e-6)
             assert line.spread[window] == pytest.approx(1e-9 * stamp[own].std() * own.sum() ** 0.5)
             assert line.moved[window] == abs(counts[own][-1] - counts[own][0])
+
+
+def test_the_noise_of_a_window_is_that_on_line() -> None:
+    """Of readings that are now and then louder than stated, in windows of a few to some dozen."""
+    rng = np.random.default_rng(3)
+    stamp = np.cumsum(rng.integers(1_000_000, 9_000_000, 2000))
+    loud = rng.choice([1.0, 1.0, 8.0], 2000) * rng.standard_normal(2000)
+    for length in (15_000_000, 90_000_000):
+        mean = MeanWindow(1.0, 0, length)
+        ends, found, at = np.arange(stamp[50], stamp[-1], 17_000_000), [], 0
+        for end in ends.tolist():
+            while at < stamp.size and stamp[at] <= end:
+                mean.insert(int(stamp[at]), float(loud[at]), Counters())
+                at += 1
+            mean.advance(end)
+            told = mean.mean()
+            found.append(told.sigma if told else 0.0)
+        inside = members(stamp, ends - length, ends)
+        noise = inside.heard(STEP * inside.step(loud), 1.0)
+        expected = np.where(inside.size > 0, noise / np.sqrt(np.maximum(inside.size, 1)), 0.0)
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
+        assert (noise > 1.0).any()
 
 
 def test_an_empty_window_has_no_reading_and_no_mean() -> None:

@@ -6,6 +6,7 @@ import random
 from dataclasses import replace
 from math import isnan
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.wheel.sync import Sync
-from gritd.estimator.wheel.windows import Counters, SlopeWindow
+from gritd.estimator.wheel.windows import Counters, MeanWindow, SlopeWindow
 from tests.rig import SETTINGS, readings_of
 
 MS = 1_000_000
@@ -72,6 +73,26 @@ def test_an_encoder_whose_clock_drifts_does_not_leap_in_position(drift, phase):
             line = window.slope()
             places.append(line.middle - speed * (end - 50 * MS - START) / NS)
     assert max(map(abs, places)) < 0.1 * speed * between / NS
+
+
+def test_sensors_that_are_louder_than_stated_are_heard():
+    """Eight times the stated noise: σ is that of the readings; of quiet ones it is the stated."""
+    rng = np.random.default_rng(5)
+    found = {}
+    for loud in (1.0, 8.0):
+        mean, line = MeanWindow(2e-3, 0, 100 * MS), SlopeWindow(0.5, 0, 100 * MS)
+        sigmas = []
+        for k in range(3000):
+            stamp = START + k * 4 * MS
+            mean.insert(stamp, 1.0 + loud * 2e-3 * rng.standard_normal(), Counters())
+            line.insert(stamp, round(20.0 * k + loud * 0.5 * rng.standard_normal()), Counters())
+            mean.advance(stamp)
+            line.advance(stamp)
+            if k > 50 and k % 25 == 0:
+                sigmas.append((mean.mean().sigma, line.slope().rate_sigma))
+        found[loud] = np.sqrt(np.mean(np.square(sigmas), axis=0))
+    assert found[1.0][0] == pytest.approx(2e-3 / 5.0, rel=0.05)
+    assert found[8.0] / found[1.0] == pytest.approx((8.0, 8.0), rel=0.1)
 
 
 def test_not_ready_before_a_window_has_filled():

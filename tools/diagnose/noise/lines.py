@@ -90,7 +90,7 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
         return np.zeros(0)
 
     interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
-    span = longest if axis in ("time", "sliding") else float(np.ptp(x[np.concatenate(parts)]))
+    span = longest if axis != "position" else float(np.ptp(x[np.concatenate(parts)]))
     every = np.arange(TUNING.noise.most_frequencies) / (TUNING.noise.line_density * span)
     tried = TUNING.orders.cycles / longest + every
     return np.asarray(tried[tried * interval < TUNING.orders.nyquist])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from gritd.estimator.plausibility.clock import ReadingTimes, clock_of, wrap_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel import window_choice
 from gritd.estimator.wheel.window_choice import Cadence
+from gritd.estimator.wheel.windows import STEP
 
 MOVES = 4.0  # [σ] of its noise, a speed that is one …
 SLOW = 0.1  # … and of the run's fastest: what is slower is a start or an end
@@ -73,6 +74,7 @@ class DrivenRun:
     slip_sigma: float  # of slip in one window, by the noise of the encoders; inf for unknown
     stated_load: float | None  # [N]
     wrap: float = 0.0  # [rad] by which the wheel's angle falls back; 0 where it does not
+    scatter: Mapping[str, float] = field(default_factory=dict)  # of one reading, by channel or axis
 
 
 @np.errstate(all="ignore")  # numbers that are none stay none
@@ -95,7 +97,8 @@ def driven(
     course = course_of(raw, settings, window)
     cadences = _cadences(raw, settings)
     sigma = _slip_sigma(settings, course, cadences, window)
-    return DrivenRun(name, course, clock, window, sigma, stated_load, wrap_of(angle))
+    scatter = dict(_scatter(raw, window, course.driving))
+    return DrivenRun(name, course, clock, window, sigma, stated_load, wrap_of(angle), scatter)
 
 
 def _length(raw: Mapping[str, Raw], settings: Settings, interval: float) -> float:
@@ -180,6 +183,31 @@ def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> RunW
         np.zeros(after.size, bool),
     )
     return with_driving(made, noise)
+
+
+def _scatter(raw: Mapping[str, Raw], window: float, driving: Bools) -> Iterator[tuple[str, float]]:
+    """What one reading of each channel, of the wrench of each axis, scatters by [raw], as the
+    filter's windows hear it: the median of the windows in which the wheel drives.
+    """
+    after, until = (
+        edge[driving] for edge in _edges(raw["wheel_encoder"].stamps, round(window * NS))
+    )
+    for channel, (stamps, values) in raw.items():
+        inside = members(stamps, after, until)
+        columns = (
+            dict(zip(WRENCH_FIELDS, values.T, strict=True))
+            if channel == "wrench"
+            else {channel: values}
+        )
+        for name, column in columns.items():
+            of_each = (
+                lines(inside, stamps, column, (after + until) // 2).left
+                if channel in ENCODERS
+                else STEP * inside.step(column)
+            )
+            told = of_each[inside.size >= LEAST]
+            if told.size >= LEAST:
+                yield name, float(np.median(told))
 
 
 def with_driving(course: RunWindows, noise: Array) -> RunWindows:

@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.plausibility import noise
 from gritd.estimator.plausibility.checks import contradictions
 from gritd.estimator.plausibility.contradiction import Contradiction
 from gritd.estimator.plausibility.driven import DrivenRun
@@ -31,27 +32,37 @@ DASH = "–"
 
 
 def sentences(given: Sequence[tuple[DrivenRun, Settings]], sources: Sources) -> Iterator[str]:
-    """The table, then what cannot be."""
+    """The table, then what cannot be, then which sensors are louder than stated."""
     yield from table(given)
     yield from warnings(given, sources)
+    yield from louder(given)
 
 
 def warnings(
     given: Sequence[tuple[DrivenRun, Settings]], sources: Sources = OF_A_RECORDING
 ) -> Iterator[str]:
-    """A line for each thing that physics or the configuration forbids, with the likely remedy; of
-    several runs that differ in figures alone, the first is quoted.
-    """
-    found: dict[str, list[tuple[str, Contradiction]]] = {}
-    for run, settings in given:
-        for one in contradictions(run, settings, sources):
-            found.setdefault(one.kind, []).append((run.name, one))
+    """A line for each thing that physics or the configuration forbids, with the likely remedy."""
+    each = [(run.name, contradictions(run, settings, sources)) for run, settings in given]
+    return (f"cannot be: {line}" for line in _once(each))
 
-    for those in found.values():
-        name, first = those[0]
-        if not first.alone and len(those) < len(given):
-            continue
-        yield f"cannot be: {_named(name, len(those), len(given))}{first.text}"
+
+def louder(given: Sequence[tuple[DrivenRun, Settings]]) -> Iterator[str]:
+    """A line for each sensor that scatters by more than its stated noise."""
+    each = [(run.name, tuple(noise.louder(run, settings))) for run, settings in given]
+    return (f"louder than stated: {line}" for line in _once(each))
+
+
+def _once(each: Sequence[tuple[str, Sequence[Contradiction]]]) -> Iterator[str]:
+    """Of several runs that differ in figures alone, the first is quoted."""
+    found: dict[str, list[tuple[str, Contradiction]]] = {}
+    for name, those in each:
+        for one in those:
+            found.setdefault(one.kind, []).append((name, one))
+
+    for same in found.values():
+        name, first = same[0]
+        if first.alone or len(same) == len(each):
+            yield f"{_named(name, len(same), len(each))}{first.text}"
 
 
 def _named(name: str, count: int, of: int) -> str:

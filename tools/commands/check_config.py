@@ -29,7 +29,7 @@ from gritd.estimator.config.settings import (
 from gritd.estimator.messages.readings import ENCODERS
 from gritd.estimator.offline.streams import RAW
 from gritd.estimator.plausibility.recorded import driven_recording
-from gritd.estimator.plausibility.words import table, warnings
+from gritd.estimator.plausibility.words import louder, table, warnings
 from gritd.estimator.plugins import left_out
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.wheel import geometry
@@ -91,7 +91,7 @@ def against(settings: Settings, paths: Sequence[Path]) -> int:
             progress.advance()
 
     contradictions = list(warnings(runs))
-    sys.stdout.write("\n" + "\n".join([*table(runs), *contradictions]) + "\n")
+    sys.stdout.write("\n" + "\n".join([*table(runs), *contradictions, *louder(runs)]) + "\n")
     return FAILED if contradictions else DONE
 
 

@@ -82,14 +82,13 @@ class ContactRelaxation(Effect):
         if np.ndim(situation.torque) == 0:
             return reaction
         length = self._length(situation)
-        shares = self._shares(situation, length), self._shares(situation, SLIP_KNOWN)
         deeper, run = self._shares(situation, self.deeper * length), situation.run
         sunk = followed(situation.sinkage, deeper, run) - situation.sinkage
+        torque, pull = self._behind(situation, length)
         return replace(
             reaction,
-            torque=reaction.torque + self._behind(situation.torque, situation, *shares),
-            drawbar_pull=reaction.drawbar_pull
-            + self._behind(situation.drawbar_pull, situation, *shares),
+            torque=reaction.torque + torque,
+            drawbar_pull=reaction.drawbar_pull + pull,
             sinkage=reaction.sinkage + self.sinkage * sunk,
         )
 
@@ -124,16 +123,18 @@ class ContactRelaxation(Effect):
         shallow = np.maximum(np.sin(situation.theta_1), SHALLOW)
         return self.length * (1.0 - self.longer + self.longer * shallow / USUAL)
 
-    def _behind(self, steady: Scalar, situation: Balanced, share: Array, known: Array) -> Array:
-        """a (ȳ − y∞) of T or DP; at rest the soil's forces fade out, and what they lag too. share,
-        known: of the way to y∞ (n,), over Λ and until the slip is known.
+    def _behind(self, situation: Balanced, length: Scalar) -> Array:
+        """a (ȳ − y∞) of T and DP (2, n); at rest the soil's forces fade out, and what they lag
+        too. length: Λ [m].
         """
-        run, way = situation.run, np.broadcast_to(situation.direction, share.shape)
-        signed = np.abs(way) * (followed(steady, share, run) - steady)
+        steady = np.stack((situation.torque, situation.drawbar_pull))
+        run, way = situation.run, np.broadcast_to(situation.direction, steady.shape[1:])
         size = _size(steady, way, run)
-        begun = _begun(size, known, run)
-        sized = way * (followed(begun, share, run) - size)
-        return np.asarray(self.forces * (self.kept * sized + (1.0 - self.kept) * signed))
+        begun = _begun(size, self._shares(situation, SLIP_KNOWN), run)
+        share = self._shares(situation, length)
+        signed, sized = followed(np.stack((steady, begun)), share, run) - (steady, size)
+        kept, lost = self.kept * way, (1.0 - self.kept) * np.abs(way)
+        return np.asarray(self.forces * (kept * sized + lost * signed))
 
     def _shares(self, situation: Balanced, length: Scalar) -> Array:
         """Of the way to y∞ that ȳ goes from one sample to the next over a length [m] (n,)."""
@@ -142,9 +143,9 @@ class ContactRelaxation(Effect):
         return np.where(situation.carried > 0.0, -np.expm1(-moved / length), 1.0)
 
 
-def _size(force: Scalar, way: Array, run: Scalar) -> Array:
-    """A force (n,) in the direction of travel, through a rest that of the latest travel of the run,
-    before that of its first; nought in a run that does not travel.
+def _size(force: Array, way: Array, run: Scalar) -> Array:
+    """Forces (k, n) in the direction of travel, through a rest those of the latest travel of the
+    run, before that those of its first; nought in a run that does not travel.
     """
     number = np.arange(way.size)
     driven = np.abs(way) > DRIVEN
@@ -153,16 +154,17 @@ def _size(force: Scalar, way: Array, run: Scalar) -> Array:
     coming = np.minimum.accumulate(np.where(driven, number, way.size)[::-1])[::-1]
     at = np.where(latest >= first, latest, np.minimum(coming, way.size - 1))
     known = driven[at] & (first[at] == first)
-    return np.asarray(np.where(known, np.asarray(force)[at] / np.where(known, way[at], 1.0), 0.0))
+    return np.asarray(np.where(known, force[:, at] / np.where(known, way[at], 1.0), 0.0))
 
 
 def _begun(size: Array, share: Array, run: Scalar) -> Array:
-    """The same (n,), the first of a run a mean over the way that it begins with: at the moment a
+    """The same (k, n), the first of a run a mean over the way that it begins with: at the moment a
     wheel starts its slip is not known.
     """
-    back = np.broadcast_to(run, size.size)[::-1]
-    before = followed(size[::-1], np.append(1.0, share[:0:-1]), back)[::-1]
-    return np.where(run_begins(run, size.size), before, size)
+    begins = run_begins(run, share.size)
+    back = np.broadcast_to(run, share.size)[::-1]
+    before = followed(size[:, ::-1], np.append(1.0, share[:0:-1]), back)[:, ::-1]
+    return np.where(begins, before, size)
 
 
 def _mobilising(situation: OnSoil) -> Scalar:

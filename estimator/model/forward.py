@@ -341,4 +341,5 @@ def _balance(
 
 
 def _full(value: Scalar, shape: tuple[int, ...]) -> Array:
-    return np.broadcast_to(np.asarray(value, dtype=float), shape)
+    values = np.asarray(value, dtype=float)
+    return values if values.shape == shape else np.broadcast_to(values, shape)

@@ -63,7 +63,7 @@ def relaxed(time: Scalar, drive: Scalar, duration: float, run: Scalar = 0.0) -> 
 
 
 def followed(target: Scalar, share: Array, run: Scalar = 0.0) -> Array:
-    """y (n,) that goes a share (n,) of the way to its target; a run begins at its target."""
+    """y (…, n) that goes a share (n,) of the way to its target; a run begins at its target."""
     return _relax(np.asarray(target), np.where(run_begins(run, share.size), 1.0, share))
 
 
@@ -107,14 +107,17 @@ def run_by_run(of: Callable[..., Array], run: Scalar, *along: Scalar) -> Array:
 
 def run_begins(run: Scalar, count: int) -> Bools:
     """Whether a run begins at a sample (n,)."""
-    runs = np.broadcast_to(run, count)
-    begins: Bools = np.ones(count, bool)
-    begins[1:] = runs[1:] != runs[:-1]
+    begins: Bools = np.zeros(count, bool)
+    begins[:1] = True
+    runs = np.asarray(run)
+    if runs.size > 1:
+        begins[1:] = runs[1:] != runs[:-1]
     return begins
 
 
 def _relax(target: Array, share: Array) -> Array:
-    """y_n = y_(n−1) + share_n (target_n − y_(n−1)), all samples at once; the first share must be 1.
+    """y_n = y_(n−1) + share_n (target_n − y_(n−1)) of targets (…, n) and shares (n,), all samples
+    at once; the first share must be 1.
 
     Two steps are one step of the same form, so the reach of a step is doubled until it covers the
     run: Hillis and Steele (1986), Comm. ACM 29, 1170-1183.
@@ -122,8 +125,8 @@ def _relax(target: Array, share: Array) -> Array:
     kept, y = 1.0 - share, share * target
     reach = 1
 
-    while reach < y.size and kept.any():
-        y[reach:] += kept[reach:] * y[:-reach]
+    while reach < kept.size and kept.any():
+        y[..., reach:] += kept[reach:] * y[..., :-reach]
         kept[reach:] = kept[reach:] * kept[:-reach]
         reach *= 2
 

@@ -351,10 +351,9 @@ class EffectsObjective:
             self.bounds.held(centre, gradient),
         )
 
-    def _predicted(self, centre: Array, near: Array | None = None) -> Array:
-        begins = None if near is None else self._acting(near)
+    def _predicted(self, centre: Array, near: Near | None = None) -> Array:
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            return self._problem.stack.predict(*self._acting(centre), near=begins)
+            return self._problem.stack.predict(*self._acting(centre), near=near)
 
     def _acting(self, centre: Array) -> Near:
         return centre[: self._count], build(self._effects, self._free, centre[self._count :])
@@ -364,6 +363,7 @@ class EffectsObjective:
         bound.
         """
         stack, raw = self._problem.stack, np.zeros((predicted.size, centre.size))
+        begins = self._acting(centre)
 
         for i in (i for i in range(first, centre.size) if i not in stack.partial):
             step = (
@@ -373,7 +373,7 @@ class EffectsObjective:
             )
             moved = centre.copy()
             moved[i] += step
-            raw[:, i] = (self._predicted(moved, centre) - predicted) / step
+            raw[:, i] = (self._predicted(moved, begins) - predicted) / step
 
         for i, (of, share) in stack.partial.items():
             raw[:, i] = share * raw[:, of]

@@ -38,6 +38,8 @@ class Prediction:
         self._data, self._channels = data, data.channels
         self._less_axle = None if data.idle is None else ~np.concatenate(data.idle)
         self._mean: Array | float = 0.0
+        self._near: tuple[Array, Sequence[Effect], Collection[str]] | None = None
+        self._driven_near: Sequence[Driven] = ()
         if held is not None:
             self._mean = np.hstack([np.array([m[c] for c in data.channels]) for m in held.means])
 
@@ -67,9 +69,7 @@ class Prediction:
         """See interface.Predict."""
         value = self._values(u)
         driven = self._driven(value, effects, in_both)
-        begins: Sequence[Driven | None] = [None] * len(driven)
-        if near is not None:
-            begins = self._driven(self._values(near[0]), near[1], in_both)
+        begins = [None] * len(driven) if near is None else self._begins(near, in_both)
 
         # readings (channels, n) of each campaign before scale, offset and delay
         parts = zip(self._campaigns, driven, begins, strict=True)
@@ -99,6 +99,15 @@ class Prediction:
         # at rest and lifted the motor current alone tells something
         driving = (np.asarray(motion.wheel_speed) != 0.0) & (np.asarray(motion.load) > 0.0)
         return Foreseen(compared, {c: driving | (c == "torque") for c in self._channels})
+
+    def _begins(self, near: Near, in_both: Collection[str]) -> Sequence[Driven]:
+        """What predictions near by begin at: derivatives ask for the same again and again."""
+        u, effects = near
+        asked = self._near
+        if asked is None or asked[0] is not u or asked[1:] != (effects, in_both):
+            self._near = u, effects, in_both
+            self._driven_near = self._driven(self._values(u), effects, in_both)
+        return self._driven_near
 
     def _driven(
         self, value: Mapping[str, float], effects: Sequence[Effect], in_both: Collection[str]

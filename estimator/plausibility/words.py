@@ -32,7 +32,7 @@ DASH = "–"
 
 
 def sentences(given: Sequence[tuple[DrivenRun, Settings]], sources: Sources) -> Iterator[str]:
-    """The table, then what cannot be, then which sensors are louder than stated."""
+    """The table, then what cannot be, then which noise exceeds the stated σ."""
     yield from table(given)
     yield from warnings(given, sources)
     yield from louder(given)
@@ -49,7 +49,7 @@ def warnings(
 def louder(given: Sequence[tuple[DrivenRun, Settings]]) -> Iterator[str]:
     """A line for each sensor that scatters by more than its stated noise."""
     each = [(run.name, tuple(noise.louder(run, settings))) for run, settings in given]
-    return (f"louder than stated: {line}" for line in _once(each))
+    return (f"noise exceeds the stated σ: {line}" for line in _once(each))
 
 
 def _once(each: Sequence[tuple[str, Sequence[Contradiction]]]) -> Iterator[str]:

@@ -69,7 +69,7 @@ SOIL = (
 TURNING = 0.5
 COUNT = 1e-6  # [m] of rim or carriage travel
 COUNTING = Counting(COUNT, COUNT, pot_scale=1.0, pot_offset=0.0)
-NOT_TAKEN = "not taken from the tables but left to be found: dry sands in general."
+NOT_TAKEN = "not taken from the tables but left to be found: any soil from sand to clay."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,7 +100,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--soil-strength",
         choices=("unknown", "table"),
         default="unknown",
-        help="cohesion and friction angle before the run: dry sands in general, or as tabulated",
+        help="cohesion and friction angle: of any soil from sand to clay, or as tabulated",
     )
 
 
@@ -321,10 +321,10 @@ def _strength(soil: dict[str, float], source: str) -> tuple[dict[str, float], st
     """Prior of cohesion [Pa] and tan φ, and the sentence that says where it is from."""
     if source == "unknown":
         return {
-            "cohesion": 500.0,
-            "cohesion_sigma": 500.0,
-            "tan_phi": 0.6,
-            "tan_phi_sigma": 0.15,
+            "cohesion": 2000.0,
+            "cohesion_sigma": 2000.0,
+            "tan_phi": 0.5,
+            "tan_phi_sigma": 0.2,
         }, NOT_TAKEN
 
     cohesion, tan_phi = (

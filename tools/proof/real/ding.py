@@ -107,7 +107,8 @@ the published and a smaller angle.
 MORE = """
 With all that was published the wheel would stand 12.5 mm deep at no slip, where 5.1 were measured,
 and pull 23 N at 60 %, where it pulled 15. More differs than how sinkage grows, and six points do
-not part it: effects whose form is bent by 40 % take more of the misfit than `slip_sinkage` does.
+not part it: a rear contact, a peak of shear and a smooth rim each take more of the misfit than
+`slip_sinkage` does.
 """
 HIDDEN = """
 The smooth wheel's own misfit is 30 % of every channel. Lugs fit what is new, with a probability of
@@ -125,9 +126,9 @@ STRENGTH = Proof(
     """,
     saw="""
         The six points as segments, with the errors of reading a figure (0.5 N, 0.25 mm, 0.1 N·m);
-        moduli, exponent and shear modulus as published; cohesion 500 ± 500 Pa and tan φ 0.6 ± 0.15,
-        dry sands in general. Then six points of a wheel with lugs of 10 mm, as if they were of the
-        smooth one, with the smooth wheel as reference.
+        moduli, exponent and shear modulus as published; cohesion 2 ± 2 kPa and tan φ 0.5 ± 0.2, any
+        soil from sand to clay. Then six points of a wheel with lugs of 10 mm, as if they were of
+        the smooth one, with the smooth wheel as reference.
     """,
     run=_run,
 )

@@ -13,6 +13,7 @@ import pytest
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.terramechanics.soil import PressureSinkage
+from gritd.estimator.terramechanics.soils import SOILS as KNOWN
 from gritd.tools.commands import estimate
 from gritd.tools.commands.import_rig import main
 from gritd.tools.diagnose.method import diagnose, fit_base
@@ -51,20 +52,13 @@ def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
 
 
 @needs("ding")
-def test_the_soils_strength_is_hidden_unless_asked_for(tmp_path: Path) -> None:
-    for strength, cohesion, tan_phi in (
-        ("unknown", 500.0, 0.6),
-        ("table", 250.0, np.tan(np.radians(31.9))),
-    ):
-        output = tmp_path / strength
-        assert (
-            main(["table", str(REAL / "ding"), "-o", str(output), "--soil-strength", strength]) == 0
-        )
-        soil = Physical(output / "ding2011_smooth.mcap").settings.soil
-        assert (soil.cohesion.value, soil.tan_phi.value) == pytest.approx(
-            (cohesion, tan_phi), rel=1e-6
-        )
-        assert soil.pressure_sinkage.second == pytest.approx(2407.4e3)
+def test_the_soils_strength_is_as_tabulated_where_asked_for(tmp_path: Path) -> None:
+    arguments = ["table", str(REAL / "ding"), "-o", str(tmp_path), "--soil-strength", "table"]
+    assert main(arguments) == 0
+    soil = Physical(tmp_path / "ding2011_smooth.mcap").settings.soil
+    assert soil.cohesion.value == pytest.approx(250.0)
+    assert soil.tan_phi.value == pytest.approx(np.tan(np.radians(31.9)))
+    assert soil.pressure_sinkage.second == pytest.approx(2407.4e3)
 
 
 # --- made-up tables ---
@@ -84,6 +78,19 @@ def rows_of(radius: float, soil: str, torque: str = "") -> list[str]:
         f"me,{radius},0.1,{soil},0.02,{40 + at / 100:.2f},{slip},{10 * slip},0.01{torque}"
         for at, slip in enumerate((0.1, 0.2, 0.4))
     ]
+
+
+def test_a_strength_left_to_be_found_may_be_that_of_any_soil(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").write_text("\n".join([HEADER, *rows_of(0.1, "clay")]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+    soil = Physical(next((tmp_path / "out").glob("*.mcap"))).settings.soil
+
+    for known in KNOWN.values():
+        tan_phi = np.tan(np.radians(known.friction_angle))
+        assert abs(known.cohesion - soil.cohesion.value) < 2.0 * soil.cohesion.sigma, known.name
+        assert abs(tan_phi - soil.tan_phi.value) < 2.0 * soil.tan_phi.sigma, known.name
+    assert soil.cohesion.value != pytest.approx(5e3)  # nor is it the tabulated one
 
 
 def test_several_wheels_and_soils_without_torque(

@@ -75,11 +75,13 @@ def _false_alarms(given: Sequence[CaseRow]) -> dict[str, Any]:
 
 
 def _names(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """Alarms of all, and names where something of the list is there."""
+    there = [row for row in rows if row.nameable]
     return {
         "detected": counted(row.alarmed for row in rows),
-        "first": {by: counted(row.first_right(by) for row in rows) for by in BY},
-        "three": {by: counted(row.three_right(by) for row in rows) for by in BY},
-        "given": {by: quantiles([row.given(by) for row in rows]) for by in BY},
+        "first": {by: counted(row.first_right(by) for row in there) for by in BY},
+        "three": {by: counted(row.three_right(by) for row in there) for by in BY},
+        "given": {by: quantiles([row.given(by) for row in there]) for by in BY},
     }
 
 

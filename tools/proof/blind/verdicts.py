@@ -15,6 +15,7 @@ import numpy as np
 
 from gritd.tools.proof.blind import heldout, seal
 from gritd.tools.proof.blind.groups import alike
+from gritd.tools.proof.blind.plant.concealed import UNLISTED as CONCEALED
 from gritd.tools.proof.blind.plant.worlds import HELD
 from gritd.tools.proof.blind.strata import LEVELS
 from gritd.tools.proof.blind.trial import ALONE, OUTCOME, RESULT, WorkerSpec
@@ -74,6 +75,11 @@ class CaseRow:
     def detectable(self) -> bool:
         """Whether one who knows all else would see every effect that is concealed."""
         return bool(self.truth) and self.detectability >= DETECTABLE * self.limit
+
+    @property
+    def nameable(self) -> bool:
+        """Whether something is there that has a name in the list."""
+        return not self.held.union(self.truth) <= set(CONCEALED)
 
     @property
     def accepted(self) -> tuple[StatedHypothesis, ...]:

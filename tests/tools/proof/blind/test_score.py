@@ -130,6 +130,9 @@ def test_counts_by_stratum_and_level() -> None:
     ) == (1, 2, 2)
     assert counted["unlisted"]["recall"]["k"] == 1
     assert counted["confusion"]["grousers"] == {"gear_ripple": 1}
+    named = {name: counts(of["first"]["name"]) for name, of in counted["strata"].items()}
+    assert named["single"] == (1, 3)
+    assert named["none"] == named["unlisted"] == (0, 0)  # there is nothing that has a name
 
     json.dumps(counted, allow_nan=False)
     text = tables.text(counted, rows)
